@@ -1,0 +1,1 @@
+"""Gaze fixation for robots: distance and obstacles from one's own motion, as Gymnasium environments."""

@@ -1,0 +1,1 @@
+"""Cameras, rigid motions, twists and the interaction matrix: pure NumPy, no simulator."""

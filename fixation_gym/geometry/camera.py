@@ -1,0 +1,70 @@
+"""Pinhole camera: pixels, normalised image coordinates, rays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fixation_gym.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Pinhole intrinsics in pixels; pixel (0, 0) is the centre of the top-left pixel."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    def __post_init__(self) -> None:
+        if self.width <= 0 or self.height <= 0:
+            raise ValueError(f"image size must be positive, got height {self.height} and width {self.width}")
+        if not (self.fx > 0 and self.fy > 0):
+            raise ValueError(f"focal lengths must be positive, got {self.fx} and {self.fy}")
+
+    @classmethod
+    def from_fovy(cls, height: int, width: int, fovy_rad: float) -> Intrinsics:
+        """Square pixels, principal point in the image centre, vertical field of view in rad."""
+        focal = height / (2.0 * math.tan(fovy_rad / 2.0))
+        return cls(width, height, focal, focal, (width - 1) / 2.0, (height - 1) / 2.0)
+
+    @cached_property
+    def matrix(self) -> FloatArray:
+        """Camera matrix K, shape (3, 3), px."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @cached_property
+    def grid(self) -> tuple[FloatArray, FloatArray]:
+        """Normalised coordinates x and y of every pixel centre, each of shape (H, W); read-only."""
+        columns = (np.arange(self.width) - self.cx) / self.fx
+        rows = (np.arange(self.height) - self.cy) / self.fy
+        x, y = np.meshgrid(columns, rows)
+        x.setflags(write=False)
+        y.setflags(write=False)
+        return x, y
+
+    def scaled(self, height: int, width: int) -> Intrinsics:
+        """Intrinsics of the same view resampled to another size."""
+        sx, sy = width / self.width, height / self.height
+        cx = (self.cx + 0.5) * sx - 0.5
+        cy = (self.cy + 0.5) * sy - 0.5
+        return Intrinsics(width, height, self.fx * sx, self.fy * sy, cx, cy)
+
+    def project(self, points_cam: FloatArray) -> FloatArray:
+        """Project points, shape (..., 3) in ``cam`` in m, to pixels, shape (..., 2); NaN behind the camera."""
+        points = np.asarray(points_cam, dtype=np.float64)
+        depth = np.where(points[..., 2] > 0.0, points[..., 2], np.nan)
+        u = self.fx * points[..., 0] / depth + self.cx
+        v = self.fy * points[..., 1] / depth + self.cy
+        return np.stack([u, v], axis=-1)
+
+    def normalise(self, pixels: FloatArray) -> FloatArray:
+        """Pixels, shape (..., 2), to normalised image coordinates, shape (..., 2)."""
+        pixels = np.asarray(pixels, dtype=np.float64)
+        return (pixels - [self.cx, self.cy]) / [self.fx, self.fy]

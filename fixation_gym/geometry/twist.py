@@ -1,0 +1,54 @@
+"""Twists [v, w] in m/s and rad/s: rates, finite motions and changes of frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from fixation_gym.geometry.rigid import inverse
+from fixation_gym.types import FloatArray
+
+
+def skew(vector: FloatArray) -> FloatArray:
+    """Matrix S, shape (3, 3), with S @ p = cross(vector, p)."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def adjoint(T_a_b: FloatArray) -> FloatArray:
+    """Matrix, shape (6, 6), that turns the twist [v, w] of a body expressed in b into the one expressed in a."""
+    rotation, position = T_a_b[:3, :3], T_a_b[:3, 3]
+    result = np.zeros((6, 6))
+    result[:3, :3] = result[3:, 3:] = rotation
+    result[:3, 3:] = skew(position) @ rotation
+    return result
+
+
+def exp_twist(twist: FloatArray, duration: float) -> FloatArray:
+    """Motion T, shape (4, 4), of a frame that keeps its own-frame twist for ``duration`` s.
+
+    T_a_cam @ T is the new pose.
+    """
+    generator = np.zeros((4, 4))
+    generator[:3, :3] = skew(twist[3:])
+    generator[:3, 3] = twist[:3]
+    return expm(generator * duration)
+
+
+def mean_twist(T_a_start: FloatArray, T_a_end: FloatArray, duration: float) -> FloatArray:
+    """Constant own-frame twist, shape (6,), that carries the first pose to the second in ``duration`` s.
+
+    Raises:
+        ValueError: if ``duration`` is not positive.
+    """
+    if duration <= 0.0:
+        raise ValueError(f"duration must be positive, got {duration}")
+    motion = inverse(T_a_start) @ T_a_end
+    angle_axis = Rotation.from_matrix(motion[:3, :3]).as_rotvec()
+    angle = float(np.linalg.norm(angle_axis))
+    hat = skew(angle_axis)
+    # Below 1e-4 rad the closed form divides rounding errors by angle^2; the Taylor value 1/12 is exact to 1e-9.
+    factor = 1.0 / 12.0 if angle < 1e-4 else (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
+    v = (np.eye(3) - 0.5 * hat + factor * hat @ hat) @ motion[:3, 3]
+    return np.array([*v, *angle_axis]) / duration
