@@ -1,0 +1,44 @@
+# `make demo` and `make test` are all a fresh machine needs; both first run scripts/bootstrap.sh.
+# ARGS passes options on:  make evaluate ARGS="--policy blind --scenario opaque --episodes 50"
+
+VENV := .venv/bin
+ARGS :=
+
+.PHONY: demo test test-core lint evaluate doctor core full lock clean
+
+demo: core
+	$(VENV)/fixation-gym demo $(ARGS)
+
+test: full
+	$(VENV)/pytest $(ARGS)
+
+test-core: full  # the tier without simulator
+	$(VENV)/pytest -m "not sim" $(ARGS)
+
+lint: full
+	$(VENV)/ruff check .
+	$(VENV)/ruff format --check .
+	$(VENV)/pyright
+
+evaluate: core
+	$(VENV)/fixation-gym evaluate $(ARGS)
+
+doctor: core
+	$(VENV)/fixation-gym doctor
+
+core full:
+	@scripts/bootstrap.sh $@
+
+# Versions in constraints.txt stay as they are while they fit pyproject.toml; delete the file to take the newest.
+# One file serves Python 3.10 to 3.12. uv also writes the packages that [tool.uv] switches off: take them out.
+lock: full
+	cp constraints.txt constraints.tmp || true
+	sed -n 's/^TORCH_VERSION=/torch==/p' scripts/bootstrap.sh | $(VENV)/uv pip compile pyproject.toml --constraint - \
+	    --universal --python-version 3.10 --extra rl --extra dev --no-emit-package setuptools \
+	    --no-annotate --no-header --quiet --output-file constraints.tmp >/dev/null
+	{ echo "# All versions, for Python 3.10 to 3.12 and every extra. Regenerate with: make lock"; \
+	  grep -v -e "'never'" -e '^#' constraints.tmp; } >constraints.txt
+	rm constraints.tmp
+
+clean:
+	rm -rf .venv build out *.egg-info .pytest_cache .ruff_cache

@@ -1,0 +1,193 @@
+"""The command line. Each command is a dataclass: its fields are the options, ``run`` does the work.
+
+Heavy modules are imported in ``run``, so that help and errors come at once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Protocol
+
+import tyro
+
+from fixation_gym.errors import UsageError
+from fixation_gym.gl import MissingGLError, select_backend
+
+
+class Command(Protocol):
+    """What every command has."""
+
+    def run(self) -> int:
+        """Do the work; returns the exit code."""
+        ...
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Film the servo policy in a few episodes of several scenarios: table, MP4 and contact sheet."""
+
+    policy: str = "servo"
+    """Policy to film."""
+    scenario: str = "clear,opaque,translucent,mirror"
+    """Scenario names, separated by commas."""
+    episodes: int = 1
+    """Episodes per scenario."""
+    seed: int = 0
+    """Chooses the block of episode seeds."""
+    out: Path = Path("out/demo")
+    """Folder of the results; an earlier demonstration there is replaced."""
+
+    def run(self) -> int:
+        """Film and print the table."""
+        from fixation_gym.evaluation.evaluate import EvaluationConfig
+
+        config = EvaluationConfig(self.policy, split_names(self.scenario), self.episodes, self.seed)
+        config.check()
+        select_backend()
+        from fixation_gym.evaluation.demo import SHEET_FILE, VIDEO_FILE, run_demo
+        from fixation_gym.evaluation.report import format_table
+
+        summary = run_demo(config, self.out)
+        print(format_table(summary["scenarios"]))
+        print(f"\n{self.out / VIDEO_FILE}\n{self.out / SHEET_FILE}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Evaluate a policy over scenarios and seeds. The same command again resumes a run that was killed."""
+
+    policy: str = "servo"
+    """servo, blind, random or oracle."""
+    scenario: str = "clear,opaque,translucent,mirror"
+    """Scenario names, separated by commas."""
+    episodes: int = 20
+    """Episodes per scenario."""
+    seed: int = 0
+    """Chooses the block of episode seeds: episode i has seed 100000 * SEED + i in every scenario."""
+    sensor_noise: str = "nominal"
+    """ideal, nominal or conservative."""
+    image_size: tuple[int, int] = (240, 320)
+    """Height and width of the wrist image, px."""
+    workers: int = 1
+    """Number of processes."""
+    backend: str = "loky"
+    """Where the processes run: loky (this machine) or ray (a Ray cluster)."""
+    out: Path = Path("out/evaluate")
+    """Folder of the results."""
+
+    def run(self) -> int:
+        """Evaluate and print the table."""
+        from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
+
+        config = EvaluationConfig(
+            policy=self.policy,
+            scenarios=split_names(self.scenario),
+            episodes=self.episodes,
+            seed=self.seed,
+            sensor_noise=self.sensor_noise,
+            image_size=self.image_size,
+            workers=self.workers,
+            backend=self.backend,
+        )
+        config.check()
+        select_backend()
+        from fixation_gym.evaluation.report import format_table
+        from fixation_gym.evaluation.storage import SUMMARY_FILE
+
+        summary = evaluate(config, self.out)
+        print(format_table(summary["scenarios"]))
+        print(f"\n{self.out / SUMMARY_FILE}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Doctor:
+    """Check the installation: versions, GL backend, OpenCV, one rendered frame."""
+
+    out: Path | None = None
+    """Folder for summary.json; none is written by default."""
+
+    def run(self) -> int:
+        """Print what was found; exit code 1 if something has to be done."""
+        from fixation_gym.doctor import diagnose
+
+        if self.out is None:
+            diagnosis = diagnose()
+        else:  # imports packages whose absence is for diagnose to report
+            from fixation_gym.evaluation.storage import SUMMARY_FILE, make_folder, write_json
+
+            make_folder(self.out)
+            diagnosis = diagnose()
+            write_json(self.out / SUMMARY_FILE, diagnosis)
+        print(json.dumps(diagnosis, indent=2))
+        return 0 if diagnosis["ok"] else 1
+
+
+Commands = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Doctor, tyro.conf.subcommand("doctor")]
+)
+
+
+def split_names(text: str) -> tuple[str, ...]:
+    """Split "a,b" into ("a", "b")."""
+    return tuple(name.strip() for name in text.split(","))
+
+
+def parse(argv: Sequence[str] | None) -> Command:
+    """Parse options.
+
+    Raises:
+        UsageError: with tyro's message, which it would print as a box, as one line.
+        SystemExit: after ``--help``.
+    """
+    output = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(output):
+            return tyro.cli(
+                Commands,
+                prog="fixation-gym",
+                description="Gaze fixation for robots: distance and obstacles from one's own motion.",
+                args=None if argv is None else list(argv),
+            )
+    except SystemExit as exit_:
+        if exit_.code in (None, 0):
+            raise
+        raise UsageError(_unbox(output.getvalue())) from None
+
+
+def _unbox(text: str) -> str:
+    """What a box of line characters, or of ASCII, says as one line; its blocks without the help text of the option."""
+    blocks = [""]
+    for line in text.splitlines()[1:]:  # the first is the title
+        words = line.strip(" │|+╭╮╰╯─")
+        if words.strip("-"):
+            blocks[-1] = f"{blocks[-1]} {words}".strip()
+        else:
+            blocks.append("")
+    blocks = [block.rstrip(".") for block in blocks if block and not block.startswith("Argument helptext")]
+    return "; ".join(blocks) or text.strip()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; errors of use end as one line and exit code 2.
+
+    Args:
+        argv: arguments without the program's name; None for those of the process.
+    """
+    try:
+        return parse(argv).run()
+    except (UsageError, MissingGLError) as error:
+        print(f"fixation-gym: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("fixation-gym: interrupted; finished episodes are kept", file=sys.stderr)
+        return 130

@@ -1,0 +1,1 @@
+"""From image to camera twist (servo laws) and from camera twist to joint velocities (resolved rate)."""

@@ -1,0 +1,156 @@
+"""What can be chosen about an environment: scenarios, sensor noise, limits. Plain frozen values, all JSON-able."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+from fixation_gym.envs.object_pool import MAX_OBSTACLES, OBSTACLE_KINDS, TARGET_SHAPES
+
+CONTROL_FREQUENCY = 25
+"""Control steps per second."""
+EPISODE_SECONDS = 25.0
+IMAGE_SIZE = (240, 320)
+"""Default (height, width) of the wrist image, px."""
+LIFT_HEIGHT = 0.10
+"""Rise of the target above its resting height that counts as lifted, m."""
+HOLD_SECONDS = 0.5
+COLLISION_FORCE = 1.0
+"""Robot-obstacle contact force above which a contact is a collision, N."""
+COLLISION_PUSH = 0.01
+"""Distance an obstacle may be pushed by the robot before it is a collision, m."""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Recipe from which scenes are sampled."""
+
+    name: str = "custom"
+    obstacle_kinds: tuple[str, ...] = ()
+    """Kinds to draw from, one of ``OBSTACLE_KINDS`` for each obstacle."""
+    obstacle_count: tuple[int, int] = (0, 0)
+    """Smallest and largest number of obstacles, inclusive."""
+    alpha: tuple[float, float] = (0.3, 0.7)
+    """Range of the opacity of see-through obstacles."""
+    target_shapes: tuple[str, ...] = tuple(shape.name for shape in TARGET_SHAPES)
+    grasp_width: tuple[float, float] = (0.025, 0.07)
+    """Range of the target's width between the fingers, m."""
+
+    def __post_init__(self) -> None:
+        _require_names("obstacle_kinds", self.obstacle_kinds, OBSTACLE_KINDS)
+        _require_names("target_shapes", self.target_shapes, tuple(shape.name for shape in TARGET_SHAPES))
+        low, high = self.obstacle_count
+        if not 0 <= low <= high <= MAX_OBSTACLES:
+            raise ValueError(f"obstacle_count must be (low, high) within 0..{MAX_OBSTACLES}, got {self.obstacle_count}")
+        if high > 0 and not self.obstacle_kinds:
+            raise ValueError(f"obstacle_count {self.obstacle_count} needs obstacle_kinds from {OBSTACLE_KINDS}")
+        if not self.target_shapes:
+            raise ValueError("target_shapes must name at least one shape")
+        if not 0.025 <= self.grasp_width[0] <= self.grasp_width[1] <= 0.07:
+            raise ValueError(f"grasp_width must be (low, high) within 0.025..0.07 m, got {self.grasp_width}")
+        if not 0.0 < self.alpha[0] <= self.alpha[1] <= 1.0:
+            raise ValueError(f"alpha must be (low, high) within (0, 1], got {self.alpha}")
+
+
+def _require_names(field: str, names: tuple[str, ...], allowed: tuple[str, ...]) -> None:
+    unknown = sorted(set(names) - set(allowed))
+    if unknown:
+        raise ValueError(f"unknown {field} {unknown}; choose from {list(allowed)}")
+
+
+SCENARIOS: dict[str, Scenario] = {
+    scenario.name: scenario
+    for scenario in (
+        Scenario("clear"),
+        Scenario("opaque", ("opaque",), (1, 3)),
+        Scenario("translucent", ("translucent",), (1, 3)),
+        Scenario("mirror", ("mirror",), (1, 1)),
+    )
+}
+SCENARIO_NAMES = tuple(SCENARIOS)
+
+
+def resolve_scenario(scenario: str | Mapping[str, Any] | Scenario) -> Scenario:
+    """Scenario of that name, or one built from a mapping of ``Scenario`` fields.
+
+    A mapping may hold ``base``, the name of the scenario whose values it changes.
+
+    Raises:
+        ValueError: for an unknown name or field; the message lists the valid ones.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    if isinstance(scenario, str):
+        if scenario not in SCENARIOS:
+            raise ValueError(f"unknown scenario {scenario!r}; choose one of {', '.join(SCENARIO_NAMES)}")
+        return SCENARIOS[scenario]
+    if not isinstance(scenario, Mapping):
+        raise ValueError(f"scenario must be a name or a mapping, got {type(scenario).__name__}")
+    values = dict(scenario)
+    base = resolve_scenario(values.pop("base", "clear"))
+    known = {field.name for field in fields(Scenario)}
+    unknown = sorted(set(values) - known)
+    if unknown:
+        raise ValueError(f"unknown scenario fields {unknown}; choose from {sorted(known | {'base'})}")
+    # JSON has no tuples: lists come back as the tuples the dataclass holds.
+    values = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+    return Scenario(**{**asdict(base), "name": "custom", **values})
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Errors of joint encoders, camera and hand-eye calibration; standard deviations unless said otherwise."""
+
+    joint_pos_rad: float = 0.0
+    """White noise of each joint angle, rad. On the Panda, 1e-5 rad moves the camera by about 0.01 mm."""
+    joint_vel_rad_s: float = 0.0
+    """White noise of each joint velocity, rad/s."""
+    hand_eye_m: float = 0.0
+    """Error of the hand-eye position per axis, constant in an episode, m."""
+    hand_eye_rad: float = 0.0
+    """Error of the hand-eye rotation per axis, constant in an episode, rad."""
+    read_noise: float = 0.0
+    """Signal-independent image noise, grey levels."""
+    shot_noise: float = 0.0
+    """Variance of the image noise per grey level of signal, grey levels."""
+    exposure_gain: float = 0.0
+    """Relative error of the exposure, constant in an episode."""
+    image_latency_s: float = 0.0
+    """Age of the image when the joints are read, unknown to the observer, s."""
+
+
+SENSOR_NOISE: dict[str, SensorNoise] = {
+    "ideal": SensorNoise(),
+    "nominal": SensorNoise(
+        joint_pos_rad=1.5e-5,
+        joint_vel_rad_s=5e-4,
+        hand_eye_m=2e-4,
+        hand_eye_rad=5e-4,
+        read_noise=1.0,
+        shot_noise=0.01,
+        exposure_gain=0.05,
+        image_latency_s=0.002,
+    ),
+    "conservative": SensorNoise(
+        joint_pos_rad=1e-4,
+        joint_vel_rad_s=3e-3,
+        hand_eye_m=1e-3,
+        hand_eye_rad=2e-3,
+        read_noise=2.0,
+        shot_noise=0.03,
+        exposure_gain=0.15,
+        image_latency_s=0.008,
+    ),
+}
+
+
+def resolve_sensor_noise(name: str) -> SensorNoise:
+    """Noise preset of that name.
+
+    Raises:
+        ValueError: for an unknown name; the message lists the valid ones.
+    """
+    if name not in SENSOR_NOISE:
+        raise ValueError(f"unknown sensor_noise {name!r}; choose one of {', '.join(SENSOR_NOISE)}")
+    return SENSOR_NOISE[name]

@@ -1,0 +1,299 @@
+"""``FixationPick-v0``: pick up the red object with a wrist camera and camera-twist actions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from fixation_gym.envs import config, rewards, sensors
+from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, sample_scene
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import matrix_to_pose
+from fixation_gym.perception.drawing import draw_overlay
+from fixation_gym.perception.pipeline import Percept, Perception
+from fixation_gym.robot import CAMERA_FOVY, HAND_EYE, TWIST_LIMITS
+from fixation_gym.types import FloatArray, ImageArray, Observation
+
+if TYPE_CHECKING:
+    from fixation_gym.envs.rendering import View
+    from fixation_gym.envs.robosuite_backend import PickSim
+
+RENDER_VIEWS = ("wrist", "front", "overlay")
+_FRONT_SIZE = (480, 640)
+
+
+class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
+    """A Franka Panda (robosuite, MuJoCo) picks up the one red object on a table, seen by its wrist camera.
+
+    **Action** ``Box(-1, 1, (7,), float32)``; values outside are clipped.
+
+    | index | meaning | unit at 1 |
+    |---|---|---|
+    | 0-2 | camera velocity v_X (right), v_Y (down), v_Z (forward) in the camera frame | 0.15 m/s |
+    | 3-5 | camera rotation rate w_X, w_Y, w_Z in the camera frame | 0.8 rad/s |
+    | 6 | gripper: below 0 opens, above 0 closes, 0 holds | - |
+
+    **Observation** ``Dict``, all of one instant; vectors are float32.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | ``rgb`` | (H, W, 3) uint8 | wrist image, top-left origin |
+    | ``joint_pos``, ``joint_vel`` | (7,) | arm joints, rad and rad/s |
+    | ``gripper_width`` | (1,) | opening between the finger pads, m |
+    | ``camera_pose`` | (7,) | position in m and quaternion (w, x, y, z) of the camera in the robot base frame |
+    | ``camera_twist`` | (6,) | measured twist [v, w] in the camera frame, m/s and rad/s |
+    | ``time`` | (1,) | s since reset |
+
+    **Reward** ``"dense"``: potential-based progress, +10 on success, -5 for the first collision; ``"sparse"``: +1 on
+    success, -1 for the first collision. The terms are in ``info["reward_terms"]`` and sum to the reward.
+
+    **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.50 m away,
+    looking within 9 cm of it. **End** ``terminated`` on success: target 0.1 m above its resting height for 0.5 s.
+    Time-outs are ``truncated`` by the spec's ``max_episode_steps`` (25 s).
+
+    **Info** the same keys in ``reset`` and ``step``: ``is_success``, ``success``, ``collision`` (robot-obstacle contact
+    above 1 N, or an obstacle pushed by more than 1 cm, so far in the episode), ``clearance_m``, ``distance_true_m``
+    (depth of the target's centre along the optical axis), ``fixation_error_px`` (of that centre from the image
+    centre; NaN behind the camera), ``reward_terms``. True values never reach the observation.
+    """
+
+    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": config.CONTROL_FREQUENCY}  # noqa: RUF012
+
+    def __init__(
+        self,
+        scenario: str | Mapping[str, Any] = "clear",
+        image_size: tuple[int, int] = config.IMAGE_SIZE,
+        sensor_noise: str = "nominal",
+        control_frequency: int = config.CONTROL_FREQUENCY,
+        render_mode: str | None = None,
+        render_view: str = "front",
+        reward: str = "dense",
+    ) -> None:
+        """Check the arguments; the simulation itself is built at the first reset.
+
+        Args:
+            scenario: name from ``config.SCENARIO_NAMES`` or a mapping of ``config.Scenario`` fields.
+            image_size: (height, width) of the wrist image, px.
+            sensor_noise: "ideal", "nominal" or "conservative".
+            control_frequency: steps per second; divides 500, the physics rate.
+            render_mode: None, "rgb_array" or "human".
+            render_view: "wrist", "front" or "overlay" (both, annotated with what perception makes of the images).
+            reward: "dense" or "sparse".
+
+        Raises:
+            ValueError: for a value that is not allowed; the message says what is.
+        """
+        self.scenario = config.resolve_scenario(scenario)
+        self.noise = config.resolve_sensor_noise(sensor_noise)
+        height, width = _checked_image_size(image_size)
+        if control_frequency not in (10, 20, 25, 50, 100):
+            raise ValueError(f"control_frequency must be 10, 20, 25, 50 or 100 Hz, got {control_frequency!r}")
+        _require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
+        _require_choice("render_view", render_view, RENDER_VIEWS)
+        _require_choice("reward", reward, rewards.REWARDS)
+        self.render_mode, self.render_view = render_mode, render_view
+        self.metadata = self.metadata | {"render_fps": control_frequency}
+        self.intrinsics = Intrinsics.from_fovy(height, width, CAMERA_FOVY)
+        self.hand_eye = HAND_EYE
+        self.control_frequency = control_frequency
+        self._reward_terms = rewards.dense_terms if reward == "dense" else rewards.sparse_terms
+        self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
+        self.observation_space = _observation_space(height, width)
+        self._sim: PickSim | None = None
+        self._views: dict[str, View] = {}
+        self._viewer: Any = None
+        self._perception = Perception(self.intrinsics, support_height_m=TABLE_HEIGHT)
+        self._percept: Percept | None = None
+        self.scene: SceneSpec | None = None
+
+    # -- Gymnasium interface -------------------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Draw a new scene. ``options`` are not used."""
+        super().reset(seed=seed)
+        self.scene = sample_scene(self.scenario, self.np_random)
+        self._errors = sensors.draw_episode_errors(self.noise, self.np_random)
+        self.sim.reset(self.scene)
+        self._steps = 0
+        self._steps_lifted = 0
+        self._collided = False
+        self._perception.reset()
+        self._state = self._task_state()
+        observation = self._observe(self.sim.data.qpos)
+        terms = dict.fromkeys(self._reward_terms(self._state, self._state), 0.0)
+        return observation, self._info(terms)
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Run one control period.
+
+        Raises:
+            ValueError: if the action has the wrong shape or holds NaN or infinity.
+        """
+        action = np.asarray(action, dtype=np.float64)
+        if action.shape != (7,) or not np.all(np.isfinite(action)):
+            raise ValueError(f"action must be 7 finite numbers in [-1, 1], got shape {action.shape}: {action}")
+        action = np.clip(action, -1.0, 1.0)
+        sim = self.sim
+        latency = round(self.noise.image_latency_s / sim.model.opt.timestep)
+        exposed, hit = sim.step(action[:6] * TWIST_LIMITS, float(action[6]), sim.substeps - latency)
+        self._steps += 1
+        self._collided = self._collided or hit or sim.obstacle_push() > config.COLLISION_PUSH
+        self._steps_lifted = self._steps_lifted + 1 if sim.target_rise() >= config.LIFT_HEIGHT else 0
+        before, self._state = self._state, self._task_state()
+        terms = self._reward_terms(before, self._state)
+        observation = self._observe(exposed)
+        if self.render_mode == "human":
+            self.render()
+        return observation, float(sum(terms.values())), self._state.success, False, self._info(terms)
+
+    def render(self) -> ImageArray | None:
+        """Picture of the current state (H, W, 3) in mode "rgb_array"; updates the window in mode "human"."""
+        if self.render_mode is None:
+            gym.logger.warn('render() needs render_mode="rgb_array" or "human" in gym.make')
+            return None
+        if self.render_mode == "human":
+            self._sync_viewer()
+            return None
+        qpos = self.sim.data.qpos
+        if self.render_view == "wrist":
+            return self._image("wrist", qpos)
+        front = self._image("front", qpos)
+        if self.render_view == "front" or self._percept is None:
+            return front
+        scale = _FRONT_SIZE[0] / self.intrinsics.height
+        wrist = draw_overlay(self._last_rgb, self._percept, scale=scale)
+        return np.ascontiguousarray(np.hstack([wrist, front]))
+
+    def close(self) -> None:
+        """Free GL contexts and windows; may be called twice."""
+        for view in self._views.values():
+            view.close()
+        self._views = {}
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
+
+    # -- for checkers, privileged policies and experiments -------------------------------------------------------
+
+    @property
+    def sim(self) -> PickSim:
+        """The simulation, built at first use: GL and model must not exist before a worker process starts."""
+        if self._sim is None:
+            from fixation_gym.gl import select_backend
+
+            select_backend()
+            from fixation_gym.envs.robosuite_backend import PickSim
+
+            self._sim = PickSim(self.control_frequency)
+        return self._sim
+
+    @property
+    def model(self) -> Any:
+        """Compiled ``mjModel``."""
+        return self.sim.model
+
+    @property
+    def data(self) -> Any:
+        """The simulation's ``mjData``."""
+        return self.sim.data
+
+    # -- pieces --------------------------------------------------------------------------------------------------
+
+    def _observe(self, exposed_qpos: FloatArray) -> dict[str, Any]:
+        state = self.sim.arm_state()
+        image = self._image("observation", exposed_qpos)
+        self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self.np_random)
+        joint_pos, joint_vel = sensors.measure_joints(state.joint_pos, state.joint_vel, self.noise, self.np_random)
+        pose = sensors.measure_camera_pose(
+            state.camera_pose, state.jacobian, joint_pos - state.joint_pos, self._errors.hand_eye
+        )
+        vectors = {
+            "joint_pos": joint_pos,
+            "joint_vel": joint_vel,
+            "gripper_width": [state.gripper_width],
+            "camera_pose": matrix_to_pose(pose),
+            "camera_twist": state.jacobian @ joint_vel,
+            "time": [self._steps / self.control_frequency],
+        }
+        observation: dict[str, Any] = {"rgb": self._last_rgb.copy()}
+        for key, value in vectors.items():
+            space = self.observation_space[key]  # pyright: ignore[reportIndexIssue]
+            observation[key] = np.clip(np.asarray(value), space.low, space.high).astype(np.float32)
+        if self.render_view == "overlay" and self.render_mode == "rgb_array":
+            self._percept = self._perception.update(Observation.from_dict(observation))
+        return observation
+
+    def _image(self, view: str, qpos: FloatArray) -> ImageArray:
+        """Render one of the views "observation", "wrist" and "front", opening it at first use."""
+        if view not in self._views:
+            from fixation_gym.envs.rendering import View
+
+            size = _FRONT_SIZE if view == "front" else (self.intrinsics.height, self.intrinsics.width)
+            camera = "front" if view == "front" else "wrist"
+            self._views[view] = View(self.sim.model, camera, *size, full_quality=view != "observation")
+        mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
+        return self._views[view].render(qpos, with_reflections=mirror)
+
+    def _sync_viewer(self) -> None:
+        if self._viewer is None:
+            import mujoco.viewer
+
+            self._viewer = mujoco.viewer.launch_passive(self.sim.model, self.sim.data)
+        self._viewer.sync()
+
+    def _task_state(self) -> rewards.TaskState:
+        sim = self.sim
+        distance = float(np.linalg.norm(sim.body_position("target") - sim.tool_position()))
+        held = self._steps_lifted >= config.HOLD_SECONDS * self.control_frequency
+        return rewards.TaskState(distance, sim.target_rise(), held, self._collided)
+
+    def _info(self, terms: dict[str, float]) -> dict[str, Any]:
+        pose = self.sim.arm_state().camera_pose
+        target = pose[:3, :3].T @ (self.sim.body_position("target") - pose[:3, 3])
+        centre = np.array([self.intrinsics.cx, self.intrinsics.cy])
+        return {
+            "is_success": self._state.success,
+            "success": self._state.success,
+            "collision": self._state.collision,
+            "clearance_m": self.sim.clearance(),
+            "distance_true_m": float(target[2]),
+            "fixation_error_px": float(np.linalg.norm(self.intrinsics.project(target) - centre)),
+            "reward_terms": terms,
+        }
+
+
+def _checked_image_size(image_size: Any) -> tuple[int, int]:
+    sizes = tuple(image_size) if isinstance(image_size, (tuple, list)) else ()
+    whole = all(isinstance(size, (int, np.integer)) and not isinstance(size, bool) for size in sizes)
+    if len(sizes) != 2 or not whole or not all(32 <= size <= 2048 for size in sizes):
+        raise ValueError(f"image_size must be (height, width), two whole numbers within 32..2048, got {image_size!r}")
+    return int(sizes[0]), int(sizes[1])
+
+
+def _require_choice(name: str, value: str | None, allowed: tuple[str | None, ...]) -> None:
+    if value not in allowed:
+        raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
+
+
+def _observation_space(height: int, width: int) -> spaces.Dict:
+    def box(*bounds: float) -> spaces.Box:
+        high = np.array(bounds, dtype=np.float32)
+        return spaces.Box(-high, high, dtype=np.float32)
+
+    return spaces.Dict(
+        {
+            "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
+            "joint_pos": box(*[4.0] * 7),
+            "joint_vel": box(*[10.0] * 7),
+            "gripper_width": spaces.Box(0.0, 0.1, (1,), np.float32),
+            "camera_pose": box(*[2.0] * 3, *[1.0] * 4),
+            "camera_twist": box(*[5.0] * 3, *[20.0] * 3),
+            "time": spaces.Box(0.0, 3600.0, (1,), np.float32),
+        }
+    )

@@ -1,0 +1,63 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's functions have no type stubs.)
+"""Pictures of the simulation: the wrist camera's image and the front view."""
+
+from __future__ import annotations
+
+import atexit
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fixation_gym.envs import scene_mjcf
+from fixation_gym.types import FloatArray, ImageArray
+
+
+class View:
+    """One camera of the model, rendered off screen at a fixed size. Create lazily: it owns a GL context."""
+
+    def __init__(self, model: Any, camera: str, height: int, width: int, *, full_quality: bool) -> None:
+        """Open a GL context.
+
+        Args:
+            model: compiled ``mjModel``.
+            camera: name of the camera.
+            height: image rows, px.
+            width: image columns, px.
+            full_quality: with robot and shadows, for people; otherwise what the wrist camera needs.
+        """
+        model.vis.global_.offheight = max(model.vis.global_.offheight, height)
+        model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
+        # Perception needs anti-aliasing: without it static edges flicker and read as motion.
+        model.vis.quality.offsamples = 4
+        self._renderer = mujoco.Renderer(model, height, width)
+        self._model = model
+        # Images are taken of a copy, so that an exposure before the end of the period leaves the physics untouched.
+        self._data = mujoco.MjData(model)
+        self._camera = camera
+        self._option = mujoco.MjvOption()
+        self._option.sitegroup[:] = 0
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[scene_mjcf.VISIBLE_GROUP] = 1
+        self._full_quality = full_quality
+        # Freed before EGL shuts down, which MuJoCo registered when it made the context; later, EGL complains.
+        atexit.register(self.close)
+
+    def render(self, qpos: FloatArray, *, with_reflections: bool) -> ImageArray:
+        """Image of the configuration, shape (H, W, 3), top-left origin."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        # The robot is behind its wrist camera; only a mirror shows it.
+        self._option.geomgroup[scene_mjcf.ROBOT_GROUP] = int(self._full_quality or with_reflections)
+        self._renderer.update_scene(self._data, self._camera, self._option)
+        flags = self._renderer.scene.flags
+        flags[mujoco.mjtRndFlag.mjRND_SHADOW] = int(self._full_quality)
+        flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = int(with_reflections)
+        return self._renderer.render().astype(np.uint8, copy=False)
+
+    def close(self) -> None:
+        """Free the GL context; may be called twice."""
+        atexit.unregister(self.close)
+        self._renderer.close()

@@ -1,0 +1,161 @@
+"""MJCF of everything that is added to robosuite's Panda and table: object pool, wrist camera, background, textures."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+
+from fixation_gym.envs.object_pool import MAX_OBSTACLES, OBSTACLE_SHAPES, TARGET_SHAPES, Part, Shape
+from fixation_gym.robot import CAMERA_FOVY, CAMERA_IN_HAND
+
+CAMERA_NAME = "wrist"
+FRONT_CAMERA_NAME = "front"
+VISIBLE_GROUP, ROBOT_GROUP, HIDDEN_GROUP = 1, 4, 5
+"""Geom groups: what all cameras see, the robot's looks, unused parts of the pool."""
+_OBJECT_FRICTION = "1.0 0.01 0.001"
+
+TEXTURES = {
+    "wood_light": "light-wood.png",
+    "wood_dark": "dark-wood.png",
+    "wood_plain": None,
+    "bricks": "white-bricks.png",
+    "metal": "steel-scratched.png",
+    "table_wood": "gray-woodgrain.png",
+    "table_plank": "light-wood.png",
+    "table_felt": "gray-felt.png",
+    "poster_metal": "brass-ambra.png",
+    "poster_earth": "dirt.png",
+    "poster_bricks": "white-bricks.png",
+    "poster_tiles": "wood-tiles.png",
+}
+_MIRROR_MATERIAL = "mirror_glass"
+
+
+def add_materials(asset: ET.Element, texture_path: Callable[[str], str]) -> None:
+    """Add one material per texture, and the mirror, the model's only reflective one."""
+    for name, file in TEXTURES.items():
+        attributes = {"name": name, "specular": "0.1", "shininess": "0.1", "reflectance": "0"}
+        if file is None:
+            attributes["rgba"] = "0.72 0.55 0.36 1"
+        else:
+            texture = {"name": f"tex_{name}", "type": "cube", "file": texture_path(file)}
+            ET.SubElement(asset, "texture", texture)
+            attributes["texture"] = f"tex_{name}"
+            if name.startswith("table"):
+                attributes["rgba"] = "0.7 0.7 0.7 1"  # a white table saturates the image
+        ET.SubElement(asset, "material", attributes)
+    mirror = {"name": _MIRROR_MATERIAL, "rgba": "0.25 0.27 0.28 1", "reflectance": "0.85", "specular": "0.6"}
+    ET.SubElement(asset, "material", mirror)
+
+
+def add_wrist_camera(hand: ET.Element) -> None:
+    """Mount the camera and its housing on the hand body."""
+    x, y, z = CAMERA_IN_HAND
+    camera = {"name": CAMERA_NAME, "mode": "fixed", "pos": f"{x} {y} {z}", "quat": "0 0.70710678 0.70710678 0"}
+    ET.SubElement(hand, "camera", camera | {"fovy": str(math.degrees(CAMERA_FOVY))})
+    # A RealSense D435 is 90 x 25 x 25 mm; its front lies just behind the optical centre.
+    housing = {"name": "camera_housing", "type": "box", "size": "0.0125 0.045 0.0125", "mass": "0.07"}
+    ET.SubElement(hand, "geom", housing | {"pos": f"{x} {y} {z - 0.014}", "rgba": "0.2 0.2 0.22 1", "group": "1"})
+
+
+def add_object_pool(worldbody: ET.Element) -> None:
+    """Add the target body and the obstacle slots, each holding the parts of all shapes it can take."""
+    target = _free_body(worldbody, "target")
+    for shape in TARGET_SHAPES:
+        _add_parts(target, "target", shape)
+    for slot in range(MAX_OBSTACLES):
+        body = _free_body(worldbody, f"obstacle{slot}")
+        for kind, shapes in OBSTACLE_SHAPES.items():
+            if kind == "mirror" and slot > 0:
+                continue  # MuJoCo draws the reflection of one geom only
+            for shape in shapes:
+                _add_parts(body, f"obstacle{slot}", shape)
+
+
+def part_name(body: str, shape: Shape, index: int) -> str:
+    """Name of the geom of one part."""
+    return f"{body}_{shape.name}_{index}"
+
+
+def _free_body(worldbody: ET.Element, name: str) -> ET.Element:
+    # gravcomp is switched off when the body takes part in a scene; parked bodies float without contacts.
+    body = ET.SubElement(worldbody, "body", {"name": name, "pos": "0 0 0", "gravcomp": "1"})
+    ET.SubElement(body, "freejoint", {"name": f"{name}_joint"})
+    ET.SubElement(body, "inertial", {"pos": "0 0 0", "mass": "0.2", "diaginertia": "2e-4 2e-4 2e-4"})
+    return body
+
+
+def _add_parts(body: ET.Element, body_name: str, shape: Shape) -> None:
+    for index, part in enumerate(shape.parts):
+        attributes = {
+            "name": part_name(body_name, shape, index),
+            "type": part.primitive,
+            "size": _numbers(_mujoco_size(part)),
+            "pos": _numbers(part.pos),
+            "quat": _numbers(_quaternion(part)),
+            "group": str(HIDDEN_GROUP),
+            "friction": _OBJECT_FRICTION,
+            "condim": "4",
+            "rgba": "0.5 0.5 0.5 1",
+        }
+        if part.finish == "mirror":
+            attributes |= {"material": _MIRROR_MATERIAL, "rgba": "1 1 1 1"}
+        ET.SubElement(body, "geom", attributes)
+
+
+def _mujoco_size(part: Part) -> tuple[float, ...]:
+    if part.primitive == "cylinder":
+        return (part.size[0], part.size[2])
+    return part.size[:1] if part.primitive == "sphere" else part.size
+
+
+def _quaternion(part: Part) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) of yaw about z after pitch about y."""
+    cy, sy = math.cos(part.yaw / 2), math.sin(part.yaw / 2)
+    cp, sp = math.cos(part.pitch / 2), math.sin(part.pitch / 2)
+    return (cy * cp, -sy * sp, cy * sp, sy * cp)
+
+
+def add_background(worldbody: ET.Element, table_top: tuple[float, float, float]) -> None:
+    """Add what gives the view texture: sheets on the table and boards behind it. Visual only, nothing red."""
+    x, y, z = table_top
+    sheets = (
+        ("poster_metal", -0.25, 0.10, 0.07, 0.09, 0.4),
+        ("poster_tiles", 0.27, -0.10, 0.06, 0.08, -0.3),
+        ("poster_bricks", 0.25, 0.20, 0.09, 0.07, 0.9),
+        ("poster_earth", 0.00, 0.28, 0.09, 0.06, 0.2),
+        ("poster_tiles", -0.22, 0.30, 0.06, 0.06, 1.3),
+        ("poster_bricks", -0.02, -0.26, 0.08, 0.06, 0.1),
+    )
+    for index, (material, dx, dy, half_x, half_y, yaw) in enumerate(sheets):
+        _visual_box(worldbody, f"sheet{index}", material, (x + dx, y + dy, z), (half_x, half_y, 0.0008), yaw)
+    boards = (
+        ("poster_tiles", -0.25, 0.62, 0.40, 0.02, 0.1),
+        ("poster_earth", 0.45, 0.58, 0.35, 0.02, -0.5),
+        ("poster_bricks", 0.75, 0.10, 0.02, 0.40, 0.2),
+    )
+    for index, (material, dx, dy, half_x, half_y, yaw) in enumerate(boards):
+        _visual_box(worldbody, f"board{index}", material, (x + dx, y + dy, z), (half_x, half_y, 0.6), yaw)
+    front = {"name": FRONT_CAMERA_NAME, "mode": "fixed", "fovy": "45"}
+    ET.SubElement(worldbody, "camera", front | {"pos": f"{x + 1.05} {y - 0.75} {z + 0.65}", "xyaxes": _FRONT_AXES})
+
+
+_FRONT_AXES = "0.58 0.81 0 -0.36 0.26 0.90"
+
+
+def _visual_box(
+    worldbody: ET.Element,
+    name: str,
+    material: str,
+    pos: tuple[float, float, float],
+    size: tuple[float, float, float],
+    yaw: float,
+) -> None:
+    attributes = {"name": name, "type": "box", "material": material, "pos": _numbers(pos), "size": _numbers(size)}
+    attributes |= {"euler": f"0 0 {yaw}", "contype": "0", "conaffinity": "0", "group": str(VISIBLE_GROUP)}
+    ET.SubElement(worldbody, "geom", attributes)
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value:.9g}" for value in values)

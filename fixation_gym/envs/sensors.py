@@ -1,0 +1,64 @@
+"""What the robot measures of the true state: encoder, hand-eye and camera errors (presets in ``config``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fixation_gym.envs.config import SensorNoise
+from fixation_gym.types import FloatArray, ImageArray
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeErrors:
+    """Errors that stay the same for one episode."""
+
+    hand_eye: FloatArray
+    """Small motion [translation in m, rotation vector in rad] from the true to the believed camera frame, (6,)."""
+    exposure: float
+    """Factor on every grey level."""
+
+
+def draw_episode_errors(noise: SensorNoise, rng: np.random.Generator) -> EpisodeErrors:
+    """Draw the calibration errors of one episode."""
+    scale = np.repeat([noise.hand_eye_m, noise.hand_eye_rad], 3)
+    exposure = 1.0 + noise.exposure_gain * rng.standard_normal()
+    return EpisodeErrors(rng.standard_normal(6) * scale, float(max(0.2, exposure)))
+
+
+def measure_joints(
+    joint_pos: FloatArray, joint_vel: FloatArray, noise: SensorNoise, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Encoder readings of joint angles and velocities, each of shape (7,), rad and rad/s."""
+    return (
+        joint_pos + noise.joint_pos_rad * rng.standard_normal(7),
+        joint_vel + noise.joint_vel_rad_s * rng.standard_normal(7),
+    )
+
+
+def measure_camera_pose(
+    T_base_cam: FloatArray, jacobian: FloatArray, joint_error: FloatArray, hand_eye: FloatArray
+) -> FloatArray:
+    """Camera pose that kinematics gives for erroneous joint angles, shape (4, 4).
+
+    The joint errors are below 1e-3 rad, so their effect is taken to first order through the Jacobian, (6, 7) in cam.
+    """
+    motion = jacobian @ joint_error + hand_eye
+    pose = T_base_cam.copy()
+    pose[:3, 3] += T_base_cam[:3, :3] @ motion[:3]
+    pose[:3, :3] = T_base_cam[:3, :3] @ Rotation.from_rotvec(motion[3:]).as_matrix()
+    return pose
+
+
+def measure_image(image: ImageArray, noise: SensorNoise, exposure: float, rng: np.random.Generator) -> ImageArray:
+    """Camera image with exposure error, read noise and shot noise, shape (H, W, 3), uint8."""
+    if noise.read_noise == 0.0 and noise.shot_noise == 0.0 and exposure == 1.0:
+        return image
+    signal = image.astype(np.float32)
+    signal *= np.float32(exposure)
+    deviation = np.sqrt(noise.read_noise**2 + noise.shot_noise * signal)
+    signal += deviation * rng.standard_normal(image.shape, dtype=np.float32)
+    np.rint(signal, out=signal)
+    return np.clip(signal, 0.0, 255.0, out=signal).astype(np.uint8)

@@ -1,0 +1,21 @@
+"""Errors that are the user's to repair; the command line prints them as one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class UsageError(ValueError):
+    """A wrong argument, name, file or folder. The message says what is allowed."""
+
+
+def check_names(names: Iterable[str], valid: Iterable[str], what: str) -> None:
+    """Check that all names are known.
+
+    Raises:
+        UsageError: naming the first unknown name, and all valid ones in their own order.
+    """
+    valid = tuple(valid)
+    for name in names:
+        if name not in valid:
+            raise UsageError(f"unknown {what} '{name}'; choose one of {', '.join(valid)}")

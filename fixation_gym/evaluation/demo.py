@@ -1,0 +1,125 @@
+"""The demonstration: a few filmed episodes, an annotated video and a contact sheet."""
+
+from __future__ import annotations
+
+import json
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+from tqdm import tqdm
+
+from fixation_gym.errors import UsageError
+from fixation_gym.evaluation import workers
+from fixation_gym.evaluation.evaluate import EvaluationConfig, summary_of
+from fixation_gym.evaluation.rollout import EpisodeResult, Policy, run_episode
+from fixation_gym.evaluation.storage import (
+    EPISODES_FILE,
+    RUN_FILE,
+    SUMMARY_FILE,
+    EpisodeKey,
+    EpisodeStore,
+    make_folder,
+    write_json,
+)
+from fixation_gym.evaluation.video import VideoWriter, caption, contact_sheet, evenly_spaced, write_png
+from fixation_gym.types import ImageArray
+
+VIDEO_FILE = "demo.mp4"
+SHEET_FILE = "contact_sheet.png"
+SHEET_COLUMNS = 5
+FRAMES_PER_SECOND = 25
+_SHEET_STRIDE = 5  # every fifth frame is kept for the sheet: enough to choose from, little memory
+_OUTCOME_FRAMES = 20  # the last frame stands this long, with the outcome
+
+
+def run_demo(config: EvaluationConfig, out: Path) -> dict[str, Any]:
+    """Film every episode, and write video, contact sheet, episodes and summary.
+
+    A demonstration does not resume: what an earlier one left in the folder is replaced.
+
+    Args:
+        config: must have passed ``check``; workers and backend are ignored.
+        out: folder; made if needed.
+
+    Returns:
+        The summary, as in ``summary.json``.
+
+    Raises:
+        UsageError: if the folder cannot be used.
+    """
+    started = time.monotonic()
+    run = {"command": "demo", **config.run_description()}
+    make_folder(out)
+    _remove_earlier_demo(out)
+    sheet: list[ImageArray] = []
+    progress = tqdm(total=len(config.episode_keys()), unit="episode", dynamic_ncols=True)
+    with EpisodeStore(out, run) as store, closing(progress):
+        with VideoWriter(out / VIDEO_FILE, FRAMES_PER_SECOND) as video:
+            for scenario in config.scenarios:
+                keys = [key for key in config.episode_keys() if key[0] == scenario]
+                # An own environment per scenario, closed at once: each holds a GL context.
+                env = workers.make_env(config.cell(keys[0]), render_mode="rgb_array", render_view="overlay")
+                with closing(env):
+                    policy = workers.make_policy(config.policy, env)
+                    for key in keys:
+                        result, frames = _film(config, key, env, policy, video)
+                        store.append(result)
+                        sheet += evenly_spaced(frames, SHEET_COLUMNS)
+                        progress.update()
+                        progress.set_postfix_str(f"{scenario}: {_outcome(result)}")
+        write_png(out / SHEET_FILE, contact_sheet(sheet, SHEET_COLUMNS))
+        summary = summary_of(config, list(store.finished.values()), time.monotonic() - started)
+        write_json(out / SUMMARY_FILE, summary)
+    return summary
+
+
+def _film(
+    config: EvaluationConfig, key: EpisodeKey, env: gymnasium.Env, policy: Policy, video: VideoWriter
+) -> tuple[EpisodeResult, list[ImageArray]]:
+    """Run one episode into the video; also returns some of its frames, the last one included."""
+    scenario, seed = key
+    kept: list[ImageArray] = []
+    last: list[ImageArray] = []
+    count = 0
+
+    def on_frame(frame: ImageArray) -> None:
+        nonlocal count
+        estimate = getattr(policy, "estimate", None)
+        phase = "" if estimate is None else f"   {estimate.phase}"
+        picture = caption(frame, f"{scenario}   seed {seed}   {count / FRAMES_PER_SECOND:5.1f} s{phase}")
+        video.add(picture)
+        if count % _SHEET_STRIDE == 0:
+            kept.append(picture)
+        last[:] = [frame]
+        count += 1
+
+    result = run_episode(env, policy, seed, on_frame, scenario, config.policy)
+    final = caption(last[0], f"{scenario}   seed {seed}   {result.time_s:5.1f} s   {_outcome(result)}")
+    for _ in range(_OUTCOME_FRAMES):
+        video.add(final)
+    return result, [*kept, final]
+
+
+def _outcome(result: EpisodeResult) -> str:
+    outcome = "success" if result.success else "no success"
+    return f"{outcome}, collision" if result.collision else outcome
+
+
+def _remove_earlier_demo(out: Path) -> None:
+    """Remove the files of an earlier demonstration, and nothing else.
+
+    Raises:
+        UsageError: if another command's results are there.
+    """
+    stored = [name for name in (RUN_FILE, EPISODES_FILE, SUMMARY_FILE) if (out / name).exists()]
+    try:
+        is_demo = json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["command"] == "demo"
+    except (OSError, ValueError, TypeError, KeyError):
+        is_demo = False
+    if stored and not is_demo:
+        raise UsageError(f"{out} holds results of another command ({stored[0]}); choose another --out")
+    for name in (SUMMARY_FILE, VIDEO_FILE, SHEET_FILE, EPISODES_FILE, RUN_FILE):
+        (out / name).unlink(missing_ok=True)

@@ -1,0 +1,170 @@
+"""Evaluation of a policy over scenarios and seeds, resumable, and its summary."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from fixation_gym.doctor import installed_versions
+from fixation_gym.errors import UsageError, check_names
+from fixation_gym.evaluation import workers
+from fixation_gym.evaluation.report import summarise
+from fixation_gym.evaluation.rollout import EpisodeResult
+from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeKey, EpisodeStore, write_json
+
+SEED_BLOCK = 100_000
+"""Episode i of ``--seed S`` has seed S * SEED_BLOCK + i, in every scenario: policies meet the same scenes."""
+
+ENV_ID = "fixation_gym:FixationPick-v0"
+SENSOR_NOISE = ("ideal", "nominal", "conservative")
+_SMALLEST_IMAGE = 32
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """What to evaluate, and with how many processes."""
+
+    policy: str = "servo"
+    scenarios: tuple[str, ...] = ("clear",)
+    episodes: int = 20
+    """Episodes per scenario."""
+    seed: int = 0
+    sensor_noise: str = "nominal"
+    image_size: tuple[int, int] = (240, 320)
+    """Height and width of the wrist image, px."""
+    env_id: str = ENV_ID
+    workers: int = 1
+    backend: str = "loky"
+
+    def check(self) -> None:
+        """Check everything that can be checked without building an environment.
+
+        Raises:
+            UsageError: naming the first bad value and what is allowed.
+        """
+        from fixation_gym.envs.config import SCENARIO_NAMES
+        from policies.catalogue import POLICY_NAMES
+
+        check_names([self.policy], POLICY_NAMES, "policy")
+        check_names(self.scenarios, SCENARIO_NAMES, "scenario")
+        check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
+        if not self.scenarios or len(set(self.scenarios)) < len(self.scenarios):
+            raise UsageError(f"--scenario must name one or more different scenarios, got {','.join(self.scenarios)!r}")
+        if not 1 <= self.episodes <= SEED_BLOCK:
+            raise UsageError(f"--episodes must be within 1..{SEED_BLOCK}, got {self.episodes}")
+        if self.seed < 0:
+            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
+        if min(self.image_size) < _SMALLEST_IMAGE:
+            raise UsageError(f"--image-size must be at least {_SMALLEST_IMAGE} by {_SMALLEST_IMAGE} px")
+        workers.check_backend(self.backend, self.workers)
+
+    def run_description(self) -> dict[str, Any]:
+        """Everything the result of one episode depends on, apart from its scenario and seed."""
+        return {
+            "policy": self.policy,
+            "seed": self.seed,
+            "sensor_noise": self.sensor_noise,
+            "image_size": list(self.image_size),
+            "env_id": self.env_id,
+            "gl": os.environ.get("MUJOCO_GL"),
+            "versions": installed_versions(),
+        }
+
+    def episode_keys(self) -> list[EpisodeKey]:
+        """(scenario, seed) of every episode, in order."""
+        return [(scenario, seed) for scenario in self.scenarios for seed in episode_seeds(self.seed, self.episodes)]
+
+    def cell(self, key: EpisodeKey) -> workers.Cell:
+        """The episode with this key, as ``workers.run_cell`` takes it."""
+        scenario, seed = key
+        return {
+            "env_id": self.env_id,
+            "scenario": scenario,
+            "policy": self.policy,
+            "seed": seed,
+            "sensor_noise": self.sensor_noise,
+            "image_size": list(self.image_size),
+        }
+
+
+def episode_seeds(seed: int, episodes: int) -> list[int]:
+    """Seeds of the episodes of one scenario; blocks of different ``seed`` never overlap."""
+    return [seed * SEED_BLOCK + index for index in range(episodes)]
+
+
+def seed_hash(keys: Sequence[EpisodeKey]) -> str:
+    """SHA-256 over the list of (scenario, seed), as compact JSON: equal hashes mean the same episodes."""
+    return hashlib.sha256(json.dumps([list(key) for key in keys], separators=(",", ":")).encode()).hexdigest()
+
+
+def evaluate(
+    config: EvaluationConfig, out: Path, run: Callable[[workers.Cell], dict[str, Any]] = workers.run_cell
+) -> dict[str, Any]:
+    """Run the episodes that a folder does not have yet, and write its summary.
+
+    Args:
+        config: must have passed ``check``.
+        out: folder; made if needed.
+        run: runs one cell; tests replace it.
+
+    Returns:
+        The summary, as in ``summary.json``.
+
+    Raises:
+        UsageError: if the folder cannot be used.
+    """
+    started = time.monotonic()
+    keys = config.episode_keys()
+    with EpisodeStore(out, {"command": "evaluate", **config.run_description()}) as store:
+        cells = [config.cell(key) for key in keys if key not in store.finished]
+        done = [store.finished[key] for key in keys if key in store.finished]
+        progress = _Progress(len(keys), done)
+        with closing(progress), closing(workers.run_cells(cells, config.workers, config.backend, run)) as values:
+            for result in map(EpisodeResult.from_json, values):
+                store.append(result)
+                progress.add(result)
+        workers.close_worlds()
+        summary = summary_of(config, [store.finished[key] for key in keys], time.monotonic() - started)
+        summary["episodes_resumed"] = len(done)
+        write_json(out / SUMMARY_FILE, summary)
+    return summary
+
+
+def summary_of(config: EvaluationConfig, results: Sequence[EpisodeResult], wall_s: float) -> dict[str, Any]:
+    """The content of ``summary.json``; ``wall_s`` is the time of this call, without earlier, interrupted ones."""
+    return {
+        "policy": config.policy,
+        "scenarios": summarise(results),
+        "seed_sha256": seed_hash(config.episode_keys()),
+        "seed": config.seed,
+        "sensor_noise": config.sensor_noise,
+        "image_size": list(config.image_size),
+        "versions": installed_versions(),
+        "gl": os.environ.get("MUJOCO_GL"),
+        "wall_s": wall_s,
+    }
+
+
+class _Progress:
+    """A progress bar that also counts successes."""
+
+    def __init__(self, total: int, done: Sequence[EpisodeResult]) -> None:
+        self._successes = sum(result.success for result in done)
+        self._bar = tqdm(total=total, initial=len(done), unit="episode", dynamic_ncols=True)
+
+    def add(self, result: EpisodeResult) -> None:
+        self._successes += result.success
+        self._bar.update()
+        self._bar.set_postfix_str(f"{result.scenario}, success {self._successes}/{self._bar.n}")
+
+    def close(self) -> None:
+        self._bar.close()

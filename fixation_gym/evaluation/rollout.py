@@ -1,0 +1,180 @@
+"""One episode of one policy, and what is measured in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from fixation_gym.evaluation.statistics import mean, minimum, root_mean_square
+
+APPROACH = "approach"
+GRASP = "grasp"
+GAZE_PHASES = ("fixate", APPROACH)
+"""Phases in which a policy holds its gaze on the target."""
+
+FrameCallback = Callable[[NDArray[np.uint8]], None]
+
+
+class Policy(Protocol):
+    """What a rollout needs of a policy.
+
+    If it also has an attribute ``estimate`` (None, or an object with ``distance_m``, ``distance_std_m`` and ``phase``),
+    its distances are judged.
+    """
+
+    def reset(self, seed: int | None) -> None:
+        """Forget the last episode."""
+        ...
+
+    def act(self, obs: Mapping[str, Any]) -> NDArray[np.float32]:
+        """Choose the action for an observation of the environment."""
+        ...
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """Measurements of one episode; None where there was nothing to measure. All values are JSON-able."""
+
+    scenario: str
+    policy: str
+    seed: int
+    success: bool
+    collision: bool
+    collision_free_success: bool
+    time_s: float
+    """Simulated time at the end, s."""
+    steps: int
+    return_: float
+    """Sum of the rewards."""
+    reward_terms: dict[str, float]
+    """Sum of every reward term over the episode."""
+    final_phase: str | None
+    distance_error_at_grasp_m: float | None
+    """Absolute error of the last distance estimate of the approach that ended in a grasp, m."""
+    distance_mae_m: float | None
+    """Mean absolute error over all steps with a distance estimate, m."""
+    fixation_rms_px: float | None
+    """Root mean square of the target's offset from the image centre while the gaze is held, px."""
+    min_clearance_m: float | None
+    """Smallest distance between robot and obstacles, m."""
+
+    def to_json(self) -> dict[str, Any]:
+        """A dict of JSON values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> EpisodeResult:
+        """The inverse of ``to_json``.
+
+        Raises:
+            TypeError: if a field is missing or unknown.
+        """
+        return cls(**values)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One decision: what the policy believed, and what was true at the same instant."""
+
+    phase: str | None
+    distance_m: float
+    """Estimated distance; NaN without an estimate."""
+    distance_true_m: float
+    fixation_error_px: float
+
+    @property
+    def distance_error_m(self) -> float:
+        """Absolute error of the estimate; NaN without one."""
+        return abs(self.distance_m - self.distance_true_m)
+
+
+def run_episode(
+    env: gymnasium.Env,
+    policy: Policy,
+    seed: int,
+    on_frame: FrameCallback | None = None,
+    scenario: str = "",
+    policy_name: str = "",
+) -> EpisodeResult:
+    """Run one episode to its end.
+
+    Args:
+        env: environment with the ``info`` keys of ``FixationPick-v0``.
+        policy: is reset with the same seed.
+        seed: of the environment's reset.
+        on_frame: called with ``env.render()`` at every decision, after the policy has seen the observation, and once
+            at the end.
+        scenario: name written to the result.
+        policy_name: name written to the result.
+    """
+    obs, info = env.reset(seed=seed)
+    policy.reset(seed)
+    steps: list[Step] = []
+    clearances = [float(info["clearance_m"])]
+    total = 0.0
+    reward_terms: dict[str, float] = {}
+    terminated = truncated = False
+    while not (terminated or truncated):
+        action = policy.act(obs)
+        steps.append(_record(policy, info))
+        if on_frame is not None:
+            on_frame(_render(env))
+        obs, reward, terminated, truncated, info = env.step(action)
+        total += float(reward)
+        clearances.append(float(info["clearance_m"]))
+        for term, value in info["reward_terms"].items():
+            reward_terms[term] = reward_terms.get(term, 0.0) + float(value)
+    if on_frame is not None:
+        on_frame(_render(env))
+    success, collision = bool(info["is_success"]), bool(info["collision"])
+    return EpisodeResult(
+        scenario=scenario,
+        policy=policy_name,
+        seed=seed,
+        success=success,
+        collision=collision,
+        collision_free_success=success and not collision,
+        time_s=float(np.asarray(obs["time"]).item()),
+        steps=len(steps),
+        return_=total,
+        reward_terms=reward_terms,
+        final_phase=steps[-1].phase,
+        distance_error_at_grasp_m=error_at_grasp(steps),
+        distance_mae_m=mean(step.distance_error_m for step in steps),
+        fixation_rms_px=root_mean_square(
+            step.fixation_error_px for step in steps if step.phase is None or step.phase in GAZE_PHASES
+        ),
+        min_clearance_m=minimum(clearances),
+    )
+
+
+def error_at_grasp(steps: Sequence[Step]) -> float | None:
+    """Distance error at the last approach step that a grasp step follows; None without such a step or estimate."""
+    for before, after in zip(reversed(steps[:-1]), reversed(steps), strict=False):
+        if before.phase == APPROACH and after.phase == GRASP:
+            return before.distance_error_m if math.isfinite(before.distance_error_m) else None
+    return None
+
+
+def _record(policy: Policy, info: Mapping[str, Any]) -> Step:
+    """Pair the policy's estimate with the truth of the observation that it was made from."""
+    estimate = getattr(policy, "estimate", None)
+    return Step(
+        phase=None if estimate is None else str(estimate.phase),
+        distance_m=math.nan if estimate is None else float(estimate.distance_m),
+        distance_true_m=float(info["distance_true_m"]),
+        fixation_error_px=float(info["fixation_error_px"]),
+    )
+
+
+def _render(env: gymnasium.Env) -> NDArray[np.uint8]:
+    frame = env.render()
+    if not isinstance(frame, np.ndarray):
+        raise TypeError("frames were asked for, but the environment renders none; make it with render_mode='rgb_array'")
+    return frame

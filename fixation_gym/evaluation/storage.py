@@ -1,0 +1,153 @@
+"""Result folders: one line per finished episode, so that a killed run resumes where it stopped.
+
+``run.json`` says what the run is, ``episodes.jsonl`` has one finished episode per line, ``summary.json`` the outcome.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.rollout import EpisodeResult
+
+RUN_FILE = "run.json"
+EPISODES_FILE = "episodes.jsonl"
+SUMMARY_FILE = "summary.json"
+
+EpisodeKey = tuple[str, int]
+"""(scenario, seed)"""
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder that files can be written to.
+
+    Raises:
+        UsageError: if that is not possible.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise UsageError(f"cannot write to the output folder {folder}: {reason}; choose another --out") from error
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON so that the file has its old or its new content, but never half of it."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("w", encoding="utf-8") as file:
+            json.dump(value, file, indent=2, allow_nan=False)
+            file.write("\n")
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+class EpisodeStore:
+    """The finished episodes of one run, in memory and in its folder. Use as a context manager.
+
+    Attributes:
+        folder: where the files are.
+        finished: results by (scenario, seed), in the order in which they were stored.
+    """
+
+    def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
+        """Start a run in a folder, or resume the one that is there.
+
+        Args:
+            folder: is made if needed.
+            run: JSON-able description of everything the results depend on, except scenario and seed of the episodes.
+
+        Raises:
+            UsageError: if the folder cannot be written, is in use, or holds another run or a damaged file.
+        """
+        make_folder(folder)
+        self.folder = folder
+        _check_run(folder, run)
+        self._file = (folder / EPISODES_FILE).open("a+b")
+        try:
+            self._lock()
+            self.finished = self._read()
+        except BaseException:
+            self._file.close()
+            raise
+        if not (folder / RUN_FILE).exists():
+            write_json(folder / RUN_FILE, dict(run))
+
+    def __enter__(self) -> EpisodeStore:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def append(self, result: EpisodeResult) -> None:
+        """Store a finished episode; it is on the disk when this returns."""
+        self._file.write(json.dumps(result.to_json(), allow_nan=False).encode() + b"\n")
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self.finished[(result.scenario, result.seed)] = result
+
+    def _lock(self) -> None:
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise UsageError(f"{self.folder} is in use by another run; choose another --out") from error
+        except OSError:  # some network file systems have no locks; there the user has to take care
+            pass
+
+    def _read(self) -> dict[EpisodeKey, EpisodeResult]:
+        """Read all episodes, and cut off a last line that a kill tore."""
+        self._file.seek(0)
+        finished: dict[EpisodeKey, EpisodeResult] = {}
+        lines = self._file.read().splitlines(keepends=True)
+        good = 0
+        for number, line in enumerate(lines, start=1):
+            result = _parse(line)
+            if result is None:
+                if number == len(lines):
+                    break
+                raise UsageError(f"{self.folder / EPISODES_FILE}, line {number} is damaged; choose another --out")
+            finished.setdefault((result.scenario, result.seed), result)
+            good += len(line)
+        self._file.truncate(good)
+        return finished
+
+
+def _parse(line: bytes) -> EpisodeResult | None:
+    if not line.endswith(b"\n"):
+        return None  # every stored line was written together with its end
+    with contextlib.suppress(ValueError, TypeError):
+        return EpisodeResult.from_json(json.loads(line))
+    return None
+
+
+def _check_run(folder: Path, run: Mapping[str, Any]) -> None:
+    path = folder / RUN_FILE
+    if not path.exists():
+        episodes = folder / EPISODES_FILE
+        if episodes.exists() and episodes.stat().st_size > 0:
+            raise UsageError(f"{folder} has {EPISODES_FILE} but no {RUN_FILE}; choose another --out")
+        return
+    try:
+        stored = dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        raise UsageError(f"{path} cannot be read ({error}); choose another --out") from error
+    wanted = json.loads(json.dumps(dict(run)))  # tuples become lists, as in the file
+    differing = [key for key in {**stored, **wanted} if stored.get(key) != wanted.get(key)]
+    if differing:
+        differences = ", ".join(f"{key} {stored.get(key)} instead of {wanted.get(key)}" for key in differing)
+        raise UsageError(f"{folder} holds another run, with {differences}; choose another --out")

@@ -1,0 +1,131 @@
+"""MP4 files, captions and contact sheets from RGB frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import imageio_ffmpeg
+import numpy as np
+
+from fixation_gym.types import ImageArray
+
+_CAPTION_HEIGHT = 26
+_GAP = 4
+
+
+class VideoWriter:
+    """Writes frames to an H.264 MP4 that every player reads. Use as a context manager.
+
+    The file gets its name only once it is complete; an exception leaves none.
+    """
+
+    def __init__(self, path: Path, fps: int) -> None:
+        """Prepare a video; the first frame decides its size."""
+        self._path = path
+        self._temporary = path.with_name(f".{path.stem}.part{path.suffix}")
+        self._fps = fps
+        self._shape: tuple[int, ...] | None = None
+        self._encoder = None
+
+    def add(self, frame: ImageArray) -> None:
+        """Append a frame, shape (H, W, 3), RGB.
+
+        Raises:
+            ValueError: if its shape is not that of the first frame.
+        """
+        if self._encoder is None:
+            self._shape = frame.shape
+            height, width = (size + size % 2 for size in frame.shape[:2])
+            self._encoder = imageio_ffmpeg.write_frames(
+                str(self._temporary),
+                (width, height),
+                fps=self._fps,
+                codec="libx264",
+                pix_fmt_in="rgb24",
+                pix_fmt_out="yuv420p",
+                macro_block_size=2,
+                output_params=["-movflags", "+faststart"],
+                ffmpeg_log_level="error",
+            )
+            self._encoder.send(None)
+        if frame.shape != self._shape:
+            raise ValueError(f"all frames must have shape {self._shape}, got {frame.shape}")
+        self._encoder.send(np.ascontiguousarray(_pad_to_even(frame)))
+
+    def __enter__(self) -> VideoWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            if self._encoder is not None:
+                self._encoder.close()
+                if error is None:
+                    self._temporary.replace(self._path)
+        finally:
+            self._temporary.unlink(missing_ok=True)
+
+
+def caption(frame: ImageArray, text: str) -> ImageArray:
+    """Put a line of text on a dark bar above a frame of shape (H, W, 3)."""
+    bar = np.full((_CAPTION_HEIGHT, frame.shape[1], 3), 24, np.uint8)
+    cv2.putText(bar, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (235, 235, 235), 1, cv2.LINE_AA)
+    return np.vstack([bar, frame])
+
+
+def contact_sheet(frames: Sequence[ImageArray], columns: int) -> ImageArray:
+    """Lay frames out row by row on white; smaller frames sit in the top left corner of their cell.
+
+    Args:
+        frames: RGB images of shape (H, W, 3), at least one.
+        columns: frames per row.
+
+    Raises:
+        ValueError: without frames or columns.
+    """
+    if not frames or columns < 1:
+        raise ValueError(f"a contact sheet needs frames and columns, got {len(frames)} and {columns}")
+    columns = min(columns, len(frames))
+    rows = -(-len(frames) // columns)
+    height = max(frame.shape[0] for frame in frames)
+    width = max(frame.shape[1] for frame in frames)
+    sheet = np.full((rows * (height + _GAP) + _GAP, columns * (width + _GAP) + _GAP, 3), 255, np.uint8)
+    for index, frame in enumerate(frames):
+        top = _GAP + index // columns * (height + _GAP)
+        left = _GAP + index % columns * (width + _GAP)
+        sheet[top : top + frame.shape[0], left : left + frame.shape[1]] = frame
+    return sheet
+
+
+def write_png(path: Path, image: ImageArray) -> None:
+    """Write an RGB image, completely or not at all.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
+    ok, data = cv2.imencode(".png", image[..., ::-1])  # OpenCV's channel order is BGR
+    if not ok:
+        raise OSError(f"cannot encode {path}")
+    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
+    try:
+        temporary.write_bytes(data.tobytes())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def evenly_spaced(frames: Sequence[ImageArray], count: int) -> list[ImageArray]:
+    """Choose ``count`` frames from first to last; fewer if there are fewer."""
+    if len(frames) <= count:
+        return list(frames)
+    return [frames[index] for index in np.linspace(0, len(frames) - 1, count).round().astype(int)]
+
+
+def _pad_to_even(frame: ImageArray) -> ImageArray:
+    """Repeat the last row or column where a size is odd, which yuv420p cannot store."""
+    height, width = frame.shape[:2]
+    return np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")

@@ -1,0 +1,127 @@
+"""Episodes in this process, in worker processes (loky), or on a Ray cluster: one function over cells."""
+
+from __future__ import annotations
+
+import atexit
+import importlib.util
+import os
+from collections.abc import Callable, Generator, Iterable, Sequence
+from typing import Any, cast
+
+import gymnasium
+
+from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.rollout import Policy, run_episode
+
+BACKENDS = ("loky", "ray")
+
+Cell = dict[str, Any]
+"""One episode to run: env_id, scenario, policy, seed, sensor_noise, image_size. JSON-able and picklable."""
+
+_worlds: dict[tuple[Any, ...], tuple[gymnasium.Env, Policy]] = {}  # at most one: environments are large
+
+
+def run_cell(cell: Cell) -> dict[str, Any]:
+    """Run the episode that a cell describes and return its ``EpisodeResult`` as a dict.
+
+    The environment stays alive for the next cell of the same scenario: building one takes seconds, a reset does not.
+    """
+    key = tuple((name, value) for name, value in sorted(cell.items()) if name != "seed")
+    key = tuple((name, tuple(value) if isinstance(value, list) else value) for name, value in key)
+    if key not in _worlds:
+        close_worlds()
+        env = make_env(cell)
+        _worlds[key] = (env, make_policy(cell["policy"], env))
+    env, policy = _worlds[key]
+    result = run_episode(env, policy, cell["seed"], scenario=cell["scenario"], policy_name=cell["policy"])
+    return result.to_json()
+
+
+def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "overlay") -> gymnasium.Env:
+    """Build the environment of a cell.
+
+    Raises:
+        MissingGLError: if nothing can render here.
+    """
+    from fixation_gym.gl import select_backend
+
+    select_backend()  # before the environment's module imports robosuite
+    _limit_opencv_threads()
+    return gymnasium.make(
+        cell["env_id"],
+        scenario=cell["scenario"],
+        sensor_noise=cell["sensor_noise"],
+        image_size=tuple(cell["image_size"]),
+        render_mode=render_mode,
+        render_view=render_view,
+    )
+
+
+def make_policy(name: str, env: gymnasium.Env) -> Policy:
+    """Build a policy by its name."""
+    from policies import catalogue
+
+    return catalogue.make_policy(name, env)
+
+
+@atexit.register
+def close_worlds() -> None:
+    """Close the environment that ``run_cell`` keeps alive in this process."""
+    while _worlds:
+        _, (env, _) = _worlds.popitem()
+        env.close()
+
+
+def check_backend(backend: str, workers: int) -> None:
+    """Check that the workers can be had.
+
+    Raises:
+        UsageError: if not, saying what is allowed or missing.
+    """
+    if workers < 1:
+        raise UsageError(f"--workers must be at least 1, got {workers}")
+    if backend not in BACKENDS:
+        raise UsageError(f"unknown backend '{backend}'; choose one of {', '.join(BACKENDS)}")
+    if backend == "ray" and importlib.util.find_spec("ray") is None:
+        raise UsageError("--backend ray needs the package ray, which is not installed; use --backend loky")
+
+
+def run_cells(
+    cells: Sequence[Cell],
+    workers: int,
+    backend: str = "loky",
+    run: Callable[[Cell], dict[str, Any]] = run_cell,
+) -> Generator[dict[str, Any], None, None]:
+    """Run all cells and yield each result as soon as it is there (with Ray, as soon as its batch is).
+
+    With more than one worker, the order is not that of the cells.
+    """
+    if workers == 1 and backend == "loky":
+        yield from map(run, cells)
+        return
+    import joblib
+
+    # Workers inherit these. More threads than cores only get into each other's way, software rendering's included.
+    for variable in ("OMP_NUM_THREADS", "LP_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    if backend == "loky":
+        parallel = joblib.Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered")
+        yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells))
+        return
+    from ray.util.joblib import register_ray  # pyright: ignore[reportMissingImports]
+
+    register_ray()
+    batch = 4 * workers  # joblib's Ray backend only returns whole lists; smaller ones lose less when killed
+    for start in range(0, len(cells), batch):
+        parallel = joblib.Parallel(n_jobs=workers, backend="ray")
+        yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells[start : start + batch]))
+
+
+def _results(values: Any) -> Iterable[dict[str, Any]]:
+    return cast("Iterable[dict[str, Any]]", values)  # joblib's types allow None, which run never returns
+
+
+def _limit_opencv_threads() -> None:
+    import cv2
+
+    cv2.setNumThreads(1)  # images are small: threads cost more than they gain

@@ -1,0 +1,110 @@
+"""Choice of the OpenGL library that MuJoCo renders with.
+
+MuJoCo reads ``MUJOCO_GL`` once, when it is imported, and robosuite sets it to ``egl`` whether or not EGL works.
+So ``select_backend`` has to run before either is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+DEBIAN_PACKAGES = ("libegl1", "libgl1", "libgles2", "libosmesa6")
+CANDIDATES = ("egl", "osmesa")
+"""Tried in this order; both render without a display."""
+
+PROBE_MODEL = """
+<mujoco>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <geom type="plane" size="1 1 0.1" rgba="0.8 0.3 0.2 1"/>
+    <camera name="down" pos="0 0 1"/>
+  </worldbody>
+</mujoco>
+"""
+
+_CHECKED = "FIXATION_GYM_GL"  # the backend that was seen working; child processes inherit it and do not probe again
+_PROBE_TIMEOUT_S = 60.0  # EGL can hang when many processes share one GPU
+_PROBE = f"""
+import mujoco
+model = mujoco.MjModel.from_xml_string('''{PROBE_MODEL}''')
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+with mujoco.Renderer(model, 16, 16) as renderer:
+    renderer.update_scene(data, "down")
+    assert renderer.render().max() > 0
+"""
+
+
+class MissingGLError(RuntimeError):
+    """No GL library renders here. The message is one line that names what to install."""
+
+
+def select_backend() -> str:
+    """Choose a working backend and set ``MUJOCO_GL`` and ``PYOPENGL_PLATFORM`` to it.
+
+    A ``MUJOCO_GL`` that the user set is checked, but never replaced. The first call costs about a second per backend
+    tried, in a child process, so that a failure leaves nothing behind in this one; later calls cost nothing.
+
+    Returns:
+        The value of ``MUJOCO_GL``: "egl" or "osmesa", or what the user chose.
+
+    Raises:
+        MissingGLError: if no backend renders, or the user's choice does not.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
+    if chosen and chosen == os.environ.get(_CHECKED):
+        return chosen
+    if chosen and not renders(chosen):
+        raise MissingGLError(
+            f"MUJOCO_GL={chosen} does not render here; unset MUJOCO_GL to choose among {', '.join(CANDIDATES)}, "
+            f"or install what it needs (Debian, software rendering: apt-get install {' '.join(DEBIAN_PACKAGES)})"
+        )
+    backend = chosen or next((candidate for candidate in CANDIDATES if renders(candidate)), "")
+    if not backend:
+        raise MissingGLError(
+            f"no GL library renders here; on Debian or Ubuntu: apt-get install {' '.join(DEBIAN_PACKAGES)}"
+        )
+    os.environ.update(backend_environment(backend), **{_CHECKED: backend})
+    return backend
+
+
+def renders(backend: str) -> bool:
+    """Whether MuJoCo renders a frame with this backend, tried in a child process."""
+    environment = {key: value for key, value in os.environ.items() if key != "PYOPENGL_PLATFORM"}
+    environment.update(backend_environment(backend))
+    try:
+        probe = subprocess.run(
+            [sys.executable, "-c", _PROBE],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=_PROBE_TIMEOUT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return False
+    return probe.returncode == 0
+
+
+def backend_environment(backend: str) -> dict[str, str]:
+    """Environment variables that make MuJoCo and PyOpenGL use a backend."""
+    variables = {"MUJOCO_GL": backend}
+    if backend in CANDIDATES:  # the two that PyOpenGL loads; with others it has no part
+        variables["PYOPENGL_PLATFORM"] = backend
+    return variables
+
+
+def main() -> int:
+    """Print the backend, or what is missing; used by scripts/bootstrap.sh."""
+    try:
+        print(select_backend())
+    except MissingGLError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

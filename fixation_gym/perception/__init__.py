@@ -1,0 +1,26 @@
+"""From images and camera poses to the fixated distance and the zero-flow map: NumPy and OpenCV, no simulator."""
+
+from fixation_gym.perception.distance_filters import DistanceSettings, Fixation
+from fixation_gym.perception.drawing import draw_overlay
+from fixation_gym.perception.optic_flow import Flow, FlowSettings
+from fixation_gym.perception.pipeline import Percept, Perception, PerceptionSettings
+from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
+from fixation_gym.perception.zero_flow import ZeroFlow, ZeroFlowSettings, obstacle_centre
+
+__all__ = [
+    "RED",
+    "Colour",
+    "DistanceSettings",
+    "Fixation",
+    "Flow",
+    "FlowSettings",
+    "Percept",
+    "Perception",
+    "PerceptionSettings",
+    "Segmentation",
+    "ZeroFlow",
+    "ZeroFlowSettings",
+    "draw_overlay",
+    "obstacle_centre",
+    "segment",
+]

@@ -1,0 +1,197 @@
+"""From observations to percepts: the only stateful part of perception."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import inverse, pose_to_matrix
+from fixation_gym.geometry.twist import mean_twist
+from fixation_gym.perception import distance_filters as distance
+from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState, Fixation
+from fixation_gym.perception.optic_flow import (
+    Float32Array,
+    Flow,
+    FlowSettings,
+    estimate_flow,
+    flow_grid,
+    invalid_flow,
+    plane_homography,
+)
+from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
+from fixation_gym.perception.zero_flow import Gaze, ZeroFlow, ZeroFlowSettings, unknown_zero_flow, zero_flow_test
+from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionSettings:
+    """Settings of every stage."""
+
+    colour: Colour = RED
+    """Colour of the target."""
+    flow: FlowSettings = field(default_factory=FlowSettings)
+    """Resolution, windows and noise of the flow."""
+    distance: DistanceSettings = field(default_factory=DistanceSettings)
+    """Prior, noise and gates of the distance filter."""
+    zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
+    """Margins and gates of the zero-flow test."""
+    max_gap_s: float = 0.1
+    """Frames farther apart than this are not differentiated, s; 2.5 periods at 25 Hz."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Percept:
+    """All that perception says after one observation."""
+
+    time: float
+    """Time of the observation, s; ``segmentation`` and ``fixation`` belong to it."""
+    segmentation: Segmentation
+    """Target in the current image."""
+    flow: Flow
+    """Optic flow at the previous frame (``flow.time``)."""
+    zfc: ZeroFlow
+    """Zero-flow test at the previous frame: what is nearer than the fixated object."""
+    fixation: Fixation
+    """Where the fixated object is now."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frame:
+    time: float
+    grey: Float32Array
+    T_base_cam: FloatArray
+    segmentation: Segmentation
+
+
+class Perception:
+    """Follows the target's distance and tests what is in front of it, one observation at a time."""
+
+    def __init__(
+        self,
+        intrinsics: Intrinsics,
+        settings: PerceptionSettings | None = None,
+        self_mask: MaskArray | None = None,
+        support_height_m: float | None = None,
+    ) -> None:
+        """Prepare for a camera.
+
+        Args:
+            intrinsics: of the images to come; any size.
+            settings: of every stage; None for the defaults.
+            self_mask: pixels where the camera sees the robot itself, shape (H, W); never obstacles.
+            support_height_m: height of the table in base, m; its surface is no obstacle. None: unknown.
+
+        Raises:
+            ValueError: if ``self_mask`` has not the size of the images.
+        """
+        shape = (intrinsics.height, intrinsics.width)
+        if self_mask is not None and self_mask.shape != shape:
+            raise ValueError(f"self_mask has shape {self_mask.shape}, but the images are {shape}")
+        self._intrinsics = intrinsics
+        self._settings = settings or PerceptionSettings()
+        self._self_mask = None if self_mask is None else np.array(self_mask, dtype=np.bool_)
+        self._support_height_m = support_height_m
+        halvings = 0
+        while intrinsics.width > self._settings.flow.max_width * 2**halvings:
+            halvings += 1
+        self._working = intrinsics.scaled(shape[0] >> halvings, shape[1] >> halvings)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything seen."""
+        self._frames: deque[_Frame] = deque(maxlen=3)
+        self._state: DistanceState | None = None
+
+    @property
+    def flow_intrinsics(self) -> Intrinsics:
+        """Camera of the grid of flow and zero-flow test: half the image, or less if that is wider than 160 px."""
+        return flow_grid(self._working)
+
+    def update(self, observation: Observation) -> Percept:
+        """Take in one observation.
+
+        Raises:
+            ValueError: if the image has the wrong shape or the time does not increase.
+        """
+        self._check(observation)
+        T_base_cam = pose_to_matrix(observation.camera_pose)
+        segmentation = self._segment(observation.rgb, T_base_cam)
+        fixation = self._follow(observation.time, T_base_cam, segmentation)
+        if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
+            self._frames.clear()
+        self._frames.append(_Frame(observation.time, self._grey(observation.rgb), T_base_cam, segmentation))
+        flow, zero_flow = self._look_for_obstacles()
+        return Percept(observation.time, segmentation, flow, zero_flow, fixation)
+
+    def _check(self, observation: Observation) -> None:
+        expected = (self._intrinsics.height, self._intrinsics.width, 3)
+        if observation.rgb.shape != expected:
+            raise ValueError(f"rgb has shape {observation.rgb.shape}, but the intrinsics ask for {expected}")
+        if self._frames and not observation.time > self._frames[-1].time:
+            last = self._frames[-1].time
+            raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
+
+    def _segment(self, rgb: ImageArray, T_base_cam: FloatArray) -> Segmentation:
+        settings = self._settings
+        if self._state is None:
+            return segment(rgb, self._intrinsics, settings.colour)
+        expected = distance.fixation_at(self._state, T_base_cam, settings.distance).centroid
+        return segment(rgb, self._intrinsics, settings.colour, expected)
+
+    def _follow(self, time: float, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
+        """Advance the distance filter to now."""
+        settings = self._settings.distance
+        if self._state is not None:
+            self._state = distance.predict(self._state, time - self._frames[-1].time, settings, seen.visible)
+        if not seen.visible:
+            return distance.fixation_at(self._state, T_base_cam, settings)
+        mean_variance = 0.5 * float(np.trace(seen.second_moments))
+        if self._state is None:
+            self._state = distance.initialise(seen.centroid, T_base_cam, settings)
+        else:
+            size = float(np.sqrt(mean_variance))
+            self._state = distance.update(
+                self._state, seen.centroid, T_base_cam, settings, size, seen.touches_border
+            )
+        return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance)
+
+    def _grey(self, rgb: ImageArray) -> Float32Array:
+        """Grey image at working resolution, 0..255."""
+        grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+        size = (self._working.width, self._working.height)
+        if grey.shape != (size[1], size[0]):
+            grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+        return grey.astype(np.float32)
+
+    def _look_for_obstacles(self) -> tuple[Flow, ZeroFlow]:
+        """Flow and zero-flow test at the middle one of the last three frames."""
+        grid = self.flow_intrinsics
+        shape = (grid.height, grid.width)
+        if len(self._frames) < 3:
+            time = self._frames[0].time
+            return invalid_flow(time, self._working), unknown_zero_flow(*shape)
+        first, middle, last = self._frames
+        settings = self._settings
+        inverse_distance, inverse_std = 0.0, 0.0
+        if self._state is not None:
+            depth, std, _ = distance.distance_at(self._state, middle.T_base_cam, settings.distance)
+            inverse_distance, inverse_std = 1.0 / depth, std / depth**2
+        outer = (inverse(frame.T_base_cam) @ middle.T_base_cam for frame in (first, last))
+        to_first, to_last = (plane_homography(T, inverse_distance, self._working) for T in outer)
+        flow = estimate_flow(
+            [frame.grey for frame in self._frames],
+            [frame.time for frame in self._frames],
+            self._working,
+            (to_first, to_last),
+            inverse_distance,
+            settings.flow,
+        )
+        if not (middle.segmentation.visible and last.segmentation.visible):
+            return flow, unknown_zero_flow(*shape)
+        twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
+        gaze = Gaze(twist, inverse_distance, inverse_std, middle.segmentation.mask, middle.T_base_cam)
+        return flow, zero_flow_test(flow, gaze, settings.zero_flow, self._self_mask, self._support_height_m)

@@ -1,0 +1,98 @@
+"""A tiny renderer of textured rectangles with exact depth: the truth for perception tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import look_at, matrix_to_pose
+from fixation_gym.types import Observation
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def noise_texture(seed: int, colour=(0.7, 0.7, 0.7), contrast: float = 0.5, size: int = 256) -> np.ndarray:
+    """Broad-band texture, shape (size, size, 3), 0..255 float32."""
+    rng = np.random.default_rng(seed)
+    image = np.zeros((size, size), np.float32)
+    for octave in (2, 4, 8, 16):
+        coarse = rng.standard_normal((size // octave, size // octave)).astype(np.float32)
+        image += cv2.resize(coarse, (size, size), interpolation=cv2.INTER_CUBIC)
+    image = np.clip(1 + contrast * image / image.std() / 2, 0.1, 1.4)
+    return np.clip(image[..., None] * np.array(colour, np.float32) * 180, 0, 255)
+
+
+def plain_texture(colour) -> np.ndarray:
+    return np.ones((8, 8, 3), np.float32) * np.array(colour, np.float32) * 255
+
+
+@dataclass
+class Rectangle:
+    """Rectangle spanned by two base-frame half axes; the texture repeats every ``period`` m."""
+
+    centre: np.ndarray
+    half_u: np.ndarray
+    half_v: np.ndarray
+    texture: np.ndarray
+    period: float = 0.25
+    round: bool = False
+
+
+@dataclass
+class Scene:
+    rectangles: list[Rectangle] = field(default_factory=list)
+
+    def render(self, T_base_cam, intrinsics: Intrinsics, noise: float = 0.0, seed: int = 0, oversample: int = 2):
+        """Image (H, W, 3) uint8, true depth (H, W) m and index of the visible rectangle (H, W)."""
+        fine = intrinsics.scaled(intrinsics.height * oversample, intrinsics.width * oversample)
+        x, y = fine.grid
+        rays = np.stack([x, y, np.ones_like(x)], -1) @ T_base_cam[:3, :3].T
+        image = np.full((*x.shape, 3), 90.0, np.float32)
+        depth = np.full(x.shape, np.inf)
+        index = np.full(x.shape, -1)
+        for number, rectangle in enumerate(self.rectangles):
+            normal = np.cross(rectangle.half_u, rectangle.half_v)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                z = ((rectangle.centre - T_base_cam[:3, 3]) @ normal) / (rays @ normal)
+            local = T_base_cam[:3, 3] + z[..., None] * rays - rectangle.centre
+            u = local @ rectangle.half_u / (rectangle.half_u @ rectangle.half_u)
+            v = local @ rectangle.half_v / (rectangle.half_v @ rectangle.half_v)
+            inside = u**2 + v**2 < 1 if rectangle.round else (abs(u) < 1) & (abs(v) < 1)
+            hit = inside & (z > 1e-3) & (z < depth)
+            scale = rectangle.texture.shape[0] / rectangle.period
+            map_u = (u * np.linalg.norm(rectangle.half_u) * scale).astype(np.float32)
+            map_v = (v * np.linalg.norm(rectangle.half_v) * scale).astype(np.float32)
+            size = rectangle.texture.shape[0]
+            colour = cv2.remap(rectangle.texture, map_u % size, map_v % size, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+            image = np.where(hit[..., None], colour, image)
+            depth = np.where(hit, z, depth)
+            index = np.where(hit, number, index)
+        image = cv2.resize(image, (intrinsics.width, intrinsics.height), interpolation=cv2.INTER_AREA)
+        image = image + noise * np.random.default_rng(seed).standard_normal(image.shape)
+        middle = oversample // 2
+        return (
+            np.clip(np.rint(image), 0, 255).astype(np.uint8),
+            depth[middle::oversample, middle::oversample],
+            index[middle::oversample, middle::oversample],
+        )
+
+
+def observe(scene: Scene, T_base_cam, time: float, intrinsics: Intrinsics, noise: float = 2.0, pose=None):
+    """Observation of a scene and the true depth."""
+    rgb, depth, index = scene.render(T_base_cam, intrinsics, noise, seed=round(time * 1000))
+    zeros = np.zeros(7)
+    reported = T_base_cam if pose is None else pose
+    return Observation(time, rgb, zeros, zeros, matrix_to_pose(reported), np.zeros(6), 0.08), depth, index
+
+
+def upright(centre, half_width: float, half_height: float, texture, **options) -> Rectangle:
+    """Rectangle facing the base's x axis, like a poster seen by a camera looking along +x."""
+    half_u, half_v = np.array([0.0, -half_width, 0.0]), np.array([0.0, 0.0, -half_height])
+    return Rectangle(np.asarray(centre, float), half_u, half_v, texture, **options)
+
+
+def fixating_pose(position, target) -> np.ndarray:
+    return look_at(np.asarray(position, float), np.asarray(target, float), UP)

@@ -1,0 +1,144 @@
+"""The command line: bad input ends with one line and exit code 2, and leaves nothing."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fixation_gym import cli, doctor, gl
+from fixation_gym.evaluation import demo, evaluate
+
+
+@pytest.fixture(autouse=True)
+def _no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cli, "select_backend", lambda: "egl")
+
+
+def error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("fixation-gym: error: ")
+    return captured.err
+
+
+@pytest.mark.parametrize("command", ["demo", "evaluate"])
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--scenario", "nowhere", "unknown scenario 'nowhere'; choose one of clear, opaque,"),
+        ("--scenario", "clear,nowhere", "unknown scenario 'nowhere'; choose one of clear, opaque,"),
+        ("--scenario", "", "unknown scenario ''"),
+        ("--policy", "best", "unknown policy 'best'; choose one of "),
+        ("--episodes", "0", "--episodes must be within 1.."),
+        ("--episodes", "many", "--episodes"),
+        ("--seed", "-1", "--seed must be 0 or more"),
+        ("--bogus", "1", "--bogus"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_no_folder(
+    command: str, option: str, value: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([command, "--out", str(tmp_path / "out"), option, value]) == 2
+    assert message in error_line(capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [[], ["levitate"]])
+def test_a_missing_or_unknown_command_names_the_commands(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(arguments) == 2
+    line = error_line(capsys)
+    assert all(command in line for command in ("demo", "evaluate", "doctor"))
+
+
+@pytest.mark.parametrize("command", ["demo", "evaluate", "doctor"])
+def test_an_output_folder_that_cannot_be_written_is_one_line(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("mine")
+    assert cli.main([command, "--out", str(tmp_path / "file" / "out")]) == 2
+    assert "cannot write to the output folder" in error_line(capsys)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("command", ["demo", "evaluate"])
+def test_a_missing_gl_library_is_one_line_and_leaves_no_folder(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def select_backend() -> str:
+        raise gl.MissingGLError("no GL library renders here; apt-get install libegl1")
+
+    monkeypatch.setattr(cli, "select_backend", select_backend)
+    assert cli.main([command, "--out", str(tmp_path / "out")]) == 2
+    assert "no GL library renders here" in error_line(capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_evaluate_passes_its_options_on_and_prints_the_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[evaluate.EvaluationConfig] = []
+
+    def fake_evaluate(config: evaluate.EvaluationConfig, out: Path) -> dict[str, Any]:
+        seen.append(config)
+        return evaluate.summary_of(config, [], 0.0)
+
+    monkeypatch.setattr(evaluate, "evaluate", fake_evaluate)
+    options = "--policy blind --scenario clear,mirror --episodes 7 --seed 3 --workers 2 --image-size 120 160"
+    assert cli.main(["evaluate", *options.split(), "--out", str(tmp_path)]) == 0
+    assert seen == [
+        evaluate.EvaluationConfig(
+            policy="blind", scenarios=("clear", "mirror"), episodes=7, seed=3, workers=2, image_size=(120, 160)
+        )
+    ]
+    assert capsys.readouterr().out.startswith("scenario")
+
+
+def test_demo_films_four_scenarios_by_default(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fake_demo(config: evaluate.EvaluationConfig, out: Path) -> dict[str, Any]:
+        assert (config.policy, config.scenarios) == ("servo", ("clear", "opaque", "translucent", "mirror"))
+        return evaluate.summary_of(config, [], 0.0)
+
+    monkeypatch.setattr(demo, "run_demo", fake_demo)
+    assert cli.main(["demo", "--out", str(tmp_path)]) == 0
+    assert str(tmp_path / "demo.mp4") in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("problems", "code"), [([], 0), (["NumPy is old; make a fresh environment"], 1)])
+def test_doctor_says_by_its_exit_code_whether_all_is_well(
+    problems: list[str], code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    diagnosis = {"ok": not problems, "problems": problems, "versions": {}, "gl": "egl"}
+    monkeypatch.setattr(doctor, "diagnose", lambda: diagnosis)
+    assert cli.main(["doctor", "--out", str(tmp_path)]) == code
+    assert json.loads(capsys.readouterr().out) == diagnosis
+    assert json.loads((tmp_path / "summary.json").read_text()) == diagnosis
+
+
+def test_an_interrupted_command_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt() -> dict[str, Any]:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(doctor, "diagnose", interrupt)
+    assert cli.main(["doctor"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_help_loads_neither_simulator_nor_torch() -> None:
+    code = (
+        "import sys, fixation_gym.cli, fixation_gym.evaluation.demo\n"
+        "try: fixation_gym.cli.main(['evaluate', '--help'])\n"
+        "finally: assert not {'mujoco', 'robosuite', 'torch'} & set(sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert "--scenario" in run.stdout
