@@ -31,6 +31,7 @@ class View:
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
         # Perception needs anti-aliasing: without it static edges flicker and read as motion.
         model.vis.quality.offsamples = 4
+        model.vis.quality.shadowsize = 1024
         self._renderer = mujoco.Renderer(model, height, width)
         self._model = model
         # Images are taken of a copy, so that an exposure before the end of the period leaves the physics untouched.

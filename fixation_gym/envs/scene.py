@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fixation_gym.control.corridor import Box, approach_directions, free_directions
 from fixation_gym.envs.config import Scenario
-from fixation_gym.envs.corridor import Box, approach_directions, free_directions
 from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, Vector, obstacle_shape, target_shape
 from fixation_gym.types import FloatArray
 

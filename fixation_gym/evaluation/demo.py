@@ -14,7 +14,7 @@ from tqdm import tqdm
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import EvaluationConfig, summary_of
-from fixation_gym.evaluation.rollout import EpisodeResult, Policy, run_episode
+from fixation_gym.evaluation.rollout import EpisodeResult, run_episode
 from fixation_gym.evaluation.storage import (
     EPISODES_FILE,
     RUN_FILE,
@@ -24,15 +24,19 @@ from fixation_gym.evaluation.storage import (
     make_folder,
     write_json,
 )
-from fixation_gym.evaluation.video import VideoWriter, caption, contact_sheet, evenly_spaced, write_png
+from fixation_gym.evaluation.video import VideoWriter, caption, contact_sheet, evenly_spaced, shrink, write_png
 from fixation_gym.types import ImageArray
+from policies.base import Policy
 
 VIDEO_FILE = "demo.mp4"
 SHEET_FILE = "contact_sheet.png"
 SHEET_COLUMNS = 5
-FRAMES_PER_SECOND = 25
-_SHEET_STRIDE = 5  # every fifth frame is kept for the sheet: enough to choose from, little memory
-_OUTCOME_FRAMES = 20  # the last frame stands this long, with the outcome
+SHEET_CELL_WIDTH = 480
+FRAME_STRIDE = 3
+"""Every third control step is filmed: two annotated views in full quality take most of the time."""
+FRAMES_PER_SECOND = 25 / FRAME_STRIDE
+_SHEET_STRIDE = 2  # every second frame is kept for the sheet: enough to choose from, little memory
+_OUTCOME_FRAMES = 10  # the last frame stands this long, with the outcome
 
 
 def run_demo(config: EvaluationConfig, out: Path) -> dict[str, Any]:
@@ -89,18 +93,18 @@ def _film(
         nonlocal count
         estimate = getattr(policy, "estimate", None)
         phase = "" if estimate is None else f"   {estimate.phase}"
-        picture = caption(frame, f"{scenario}   seed {seed}   {count / FRAMES_PER_SECOND:5.1f} s{phase}")
-        video.add(picture)
+        text = f"{scenario}   seed {seed}   {count / FRAMES_PER_SECOND:5.1f} s{phase}"
+        video.add(caption(frame, text))
         if count % _SHEET_STRIDE == 0:
-            kept.append(picture)
+            kept.append(caption(shrink(frame, SHEET_CELL_WIDTH), text))
         last[:] = [frame]
         count += 1
 
-    result = run_episode(env, policy, seed, on_frame, scenario, config.policy)
-    final = caption(last[0], f"{scenario}   seed {seed}   {result.time_s:5.1f} s   {_outcome(result)}")
+    result = run_episode(env, policy, seed, on_frame, scenario, config.policy, FRAME_STRIDE)
+    text = f"{scenario}   seed {seed}   {result.time_s:5.1f} s   {_outcome(result)}"
     for _ in range(_OUTCOME_FRAMES):
-        video.add(final)
-    return result, [*kept, final]
+        video.add(caption(last[0], text))
+    return result, [*kept, caption(shrink(last[0], SHEET_CELL_WIDTH), text)]
 
 
 def _outcome(result: EpisodeResult) -> str:

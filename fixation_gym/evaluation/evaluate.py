@@ -25,8 +25,7 @@ SEED_BLOCK = 100_000
 """Episode i of ``--seed S`` has seed S * SEED_BLOCK + i, in every scenario: policies meet the same scenes."""
 
 ENV_ID = "fixation_gym:FixationPick-v0"
-SENSOR_NOISE = ("ideal", "nominal", "conservative")
-_SMALLEST_IMAGE = 32
+_IMAGE_SIZES = (32, 2048)
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class EvaluationConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SCENARIO_NAMES
+        from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
         from policies.catalogue import POLICY_NAMES
 
         check_names([self.policy], POLICY_NAMES, "policy")
@@ -63,8 +62,8 @@ class EvaluationConfig:
             raise UsageError(f"--episodes must be within 1..{SEED_BLOCK}, got {self.episodes}")
         if self.seed < 0:
             raise UsageError(f"--seed must be 0 or more, got {self.seed}")
-        if min(self.image_size) < _SMALLEST_IMAGE:
-            raise UsageError(f"--image-size must be at least {_SMALLEST_IMAGE} by {_SMALLEST_IMAGE} px")
+        if not all(_IMAGE_SIZES[0] <= size <= _IMAGE_SIZES[1] for size in self.image_size):
+            raise UsageError(f"--image-size must be within {_IMAGE_SIZES[0]}..{_IMAGE_SIZES[1]}, got {self.image_size}")
         workers.check_backend(self.backend, self.workers)
 
     def run_description(self) -> dict[str, Any]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from fixation_gym.evaluation.statistics import mean, minimum, root_mean_square
+from policies.base import Policy
 
 APPROACH = "approach"
 GRASP = "grasp"
@@ -19,22 +20,6 @@ GAZE_PHASES = ("fixate", APPROACH)
 """Phases in which a policy holds its gaze on the target."""
 
 FrameCallback = Callable[[NDArray[np.uint8]], None]
-
-
-class Policy(Protocol):
-    """What a rollout needs of a policy.
-
-    If it also has an attribute ``estimate`` (None, or an object with ``distance_m``, ``distance_std_m`` and ``phase``),
-    its distances are judged.
-    """
-
-    def reset(self, seed: int | None) -> None:
-        """Forget the last episode."""
-        ...
-
-    def act(self, obs: Mapping[str, Any]) -> NDArray[np.float32]:
-        """Choose the action for an observation of the environment."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -101,17 +86,19 @@ def run_episode(
     on_frame: FrameCallback | None = None,
     scenario: str = "",
     policy_name: str = "",
+    frame_stride: int = 1,
 ) -> EpisodeResult:
     """Run one episode to its end.
 
     Args:
         env: environment with the ``info`` keys of ``FixationPick-v0``.
-        policy: is reset with the same seed.
+        policy: is reset with the same seed. If it has an attribute ``estimate`` (a ``policies.base.Estimate`` or None),
+            its distances are judged.
         seed: of the environment's reset.
-        on_frame: called with ``env.render()`` at every decision, after the policy has seen the observation, and once
-            at the end.
+        on_frame: called with ``env.render()`` at decisions, after the policy has seen the observation, and at the end.
         scenario: name written to the result.
         policy_name: name written to the result.
+        frame_stride: every ``frame_stride``-th decision is rendered.
     """
     obs, info = env.reset(seed=seed)
     policy.reset(seed)
@@ -123,7 +110,7 @@ def run_episode(
     while not (terminated or truncated):
         action = policy.act(obs)
         steps.append(_record(policy, info))
-        if on_frame is not None:
+        if on_frame is not None and (len(steps) - 1) % frame_stride == 0:
             on_frame(_render(env))
         obs, reward, terminated, truncated, info = env.step(action)
         total += float(reward)

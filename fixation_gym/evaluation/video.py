@@ -22,7 +22,7 @@ class VideoWriter:
     The file gets its name only once it is complete; an exception leaves none.
     """
 
-    def __init__(self, path: Path, fps: int) -> None:
+    def __init__(self, path: Path, fps: float) -> None:
         """Prepare a video; the first frame decides its size."""
         self._path = path
         self._temporary = path.with_name(f".{path.stem}.part{path.suffix}")
@@ -42,7 +42,7 @@ class VideoWriter:
             self._encoder = imageio_ffmpeg.write_frames(
                 str(self._temporary),
                 (width, height),
-                fps=self._fps,
+                fps=self._fps,  # pyright: ignore[reportArgumentType]  (declared int, but fractions work)
                 codec="libx264",
                 pix_fmt_in="rgb24",
                 pix_fmt_out="yuv420p",
@@ -75,6 +75,14 @@ def caption(frame: ImageArray, text: str) -> ImageArray:
     bar = np.full((_CAPTION_HEIGHT, frame.shape[1], 3), 24, np.uint8)
     cv2.putText(bar, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (235, 235, 235), 1, cv2.LINE_AA)
     return np.vstack([bar, frame])
+
+
+def shrink(frame: ImageArray, width: int) -> ImageArray:
+    """Scale a frame of shape (H, W, 3) down to a width in px; a narrower one stays as it is."""
+    if frame.shape[1] <= width:
+        return frame
+    height = round(frame.shape[0] * width / frame.shape[1])
+    return cv2.resize(frame, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
 def contact_sheet(frames: Sequence[ImageArray], columns: int) -> ImageArray:

@@ -11,7 +11,8 @@ from typing import Any, cast
 import gymnasium
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.rollout import Policy, run_episode
+from fixation_gym.evaluation.rollout import run_episode
+from policies.base import Policy
 
 BACKENDS = ("loky", "ray")
 

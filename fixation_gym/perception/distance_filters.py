@@ -136,7 +136,7 @@ def update(
         if rejected >= settings.alarm_count:
             return _restart(state, centroid, T_base_cam, settings)
         return replace(state, nis=nis, rejected=rejected)
-    mean = state.mean
+    mean, gain = state.mean, np.zeros((3, 2))
     for _ in range(3):
         predicted, jacobian = _projection(state, mean, T_base_cam)
         gain = state.cov @ jacobian.T @ np.linalg.inv(jacobian @ state.cov @ jacobian.T + noise)

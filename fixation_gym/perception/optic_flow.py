@@ -41,6 +41,8 @@ class FlowSettings:
 
     max_width: int = 320
     """Images wider than this are halved until they are not, px; the flow grid is half of that."""
+    illumination_window: int = 15
+    """Brightness that varies more slowly than over this length is ignored, px of the frames."""
     window: int = 5
     """Side of the square over which gradients are pooled, px of the flow grid."""
     levels: int = 3
@@ -51,7 +53,7 @@ class FlowSettings:
     """Temporal noise of the frames, grey levels (0..255)."""
     motion_noise_std: float = 0.05
     """Departure of single pixels from the window's common motion (interpolation, aliasing), px per interval."""
-    noise_correlation: float = 7.0
+    noise_correlation: float = 5.0
     """Neighbouring pixels per independent sample: the prefilters correlate the noise of neighbours."""
 
 
@@ -210,8 +212,10 @@ def _gradient_sums(
     if levels == 1 or min(half) < 8 * settings.window:
         return sums
     # Averaging 2x2 pixels halves white noise; the model noise, in px of the level, stays.
-    smaller = (cv2.resize(image, half, interpolation=cv2.INTER_AREA) for image in (smooth, change))
-    coarse = _gradient_sums(*smaller, 0.5 * noise_std, settings, levels - 1)
+    small_smooth, small_change = (
+        np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.float32) for image in (smooth, change)
+    )
+    coarse = _gradient_sums(small_smooth, small_change, 0.5 * noise_std, settings, levels - 1)
     motion_x, motion_y = _solve(_invert(coarse[:3]), coarse[3:])
     # A motion of m px of these frames is m / 4 px of the coarser level's grid.
     fast = motion_x * motion_x + motion_y * motion_y > (0.25 * settings.max_displacement) ** 2
@@ -238,12 +242,20 @@ def _level_sums(smooth: Float32Array, change: Float32Array, noise_std: float, se
     wx, wy = weight * ix, weight * iy
     half = (smooth.shape[1] // 2, smooth.shape[0] // 2)
     window = (settings.window, settings.window)
+    # Noise alone gives gradients; their mean energy is taken out, else plain surfaces would seem to stand still.
+    own = (SPACE_DERIVATIVE**2).sum() * (SPACE_PREFILTER**2).sum() * (TIME_PREFILTER**2).sum() * noise_std**2
+    floor = weight * np.float32(own)
     sums = np.empty((5, half[1], half[0]), np.float32)
     # Four pixels per pixel of the grid; a gradient per px of the grid is twice that per px of the frame.
-    for plane, product, scale in ((0, wx * ix, 16), (1, wx * iy, 16), (2, wy * iy, 16), (3, wx * it, 8), (4, wy * it, 8)):
+    products = ((wx * ix - floor, 16), (wx * iy, 16), (wy * iy - floor, 16), (wx * it, 8), (wy * it, 8))
+    for plane, (product, scale) in enumerate(products):
         pooled = cv2.resize(product, half, interpolation=cv2.INTER_AREA)
         sums[plane] = cv2.boxFilter(pooled, cv2.CV_32F, window, normalize=False, borderType=border)
         sums[plane] *= np.float32(scale)
+    # What is left on a plain surface scatters by about a third of the energy taken out; no less is ever stated.
+    least = np.float32(0.3 * own / noise * 16 * settings.window**2)
+    np.maximum(sums[0], least, out=sums[0])
+    np.maximum(sums[2], least, out=sums[2])
     return sums
 
 
@@ -252,9 +264,10 @@ def _invert(information: Float32Array) -> Float32Array:
 
     Along an edge the information may be 0; float32 needs the prior to be 1e-5 of the trace there.
     """
-    prior = _WEAK + np.float32(1e-5) * (information[0] + information[2])
-    xx, xy, yy = information[0] + prior, information[1], information[2] + prior
-    scale = 1.0 / (xx * yy - xy * xy)
+    xx, xy, yy = information
+    prior = _WEAK + np.float32(1e-5) * (xx + yy)
+    determinant = np.maximum(xx * yy - xy * xy, np.float32(0.0)) + prior * (xx + yy + prior)
+    xx, yy, scale = xx + prior, yy + prior, 1.0 / determinant
     return np.stack([yy * scale, -xy * scale, xx * scale])
 
 

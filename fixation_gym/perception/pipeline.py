@@ -154,18 +154,20 @@ class Perception:
             self._state = distance.initialise(seen.centroid, T_base_cam, settings)
         else:
             size = float(np.sqrt(mean_variance))
-            self._state = distance.update(
-                self._state, seen.centroid, T_base_cam, settings, size, seen.touches_border
-            )
+            self._state = distance.update(self._state, seen.centroid, T_base_cam, settings, size, seen.touches_border)
         return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance)
 
     def _grey(self, rgb: ImageArray) -> Float32Array:
-        """Grey image at working resolution, 0..255."""
+        """Grey image at working resolution without its slow variations, grey levels."""
         grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
         size = (self._working.width, self._working.height)
         if grey.shape != (size[1], size[0]):
             grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
-        return grey.astype(np.float32)
+        # Highlights and shading stay in the image while surfaces move through it; on weak texture they would pass for
+        # motion. They vary slowly over the image, so the local mean takes them out, and exposure changes with them.
+        grey = grey.astype(np.float32)
+        side = 2 * (self._settings.flow.illumination_window // 2) + 1
+        return grey - cv2.blur(grey, (side, side))
 
     def _look_for_obstacles(self) -> tuple[Flow, ZeroFlow]:
         """Flow and zero-flow test at the middle one of the last three frames."""

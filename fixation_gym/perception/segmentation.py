@@ -101,14 +101,14 @@ def _not_visible(height: int, width: int) -> Segmentation:
 
 def _colour_mask(rgb: ImageArray, colour: Colour) -> ImageArray:
     """Pixels within the colour range, without isolated ones; shape (H, W), 0 or 1."""
-    hsv = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)  # OpenCV keeps hue in units of 2 degrees
+    hsv = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV), np.uint8)  # OpenCV keeps hue in units of 2 degrees
     low, high = colour.hue_deg - colour.hue_tolerance_deg, colour.hue_deg + colour.hue_tolerance_deg
     mask = _in_hue_range(hsv, max(low, 0.0), min(high, 360.0), colour)
     if low < 0.0:
         mask |= _in_hue_range(hsv, low + 360.0, 360.0, colour)
     if high > 360.0:
         mask |= _in_hue_range(hsv, 0.0, high - 360.0, colour)
-    return cv2.medianBlur(mask, 3) & 1
+    return np.asarray(cv2.medianBlur(mask, 3), np.uint8) & np.uint8(1)
 
 
 def _in_hue_range(hsv: ImageArray, low_deg: float, high_deg: float, colour: Colour) -> ImageArray:
@@ -117,9 +117,7 @@ def _in_hue_range(hsv: ImageArray, low_deg: float, high_deg: float, colour: Colo
     return np.asarray(cv2.inRange(hsv, lower, upper), dtype=np.uint8)
 
 
-def _largest_group(
-    mask: ImageArray, colour: Colour, intrinsics: Intrinsics, expected: FloatArray | None
-) -> ImageArray:
+def _largest_group(mask: ImageArray, colour: Colour, intrinsics: Intrinsics, expected: FloatArray | None) -> ImageArray:
     """Keep the best group of parts that lie closer together than the merge gap; shape (H, W), 0 or 1."""
     step = max(1, mask.shape[1] // 160)  # grouping needs no more than 160 columns
     small = cv2.resize(mask * np.uint8(255), None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA)

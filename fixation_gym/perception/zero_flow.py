@@ -19,7 +19,7 @@ from scipy.special import ndtr
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import epipolar_direction
-from fixation_gym.perception.optic_flow import Flow, Float32Array
+from fixation_gym.perception.optic_flow import Float32Array, Flow
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 CELLS = 32
@@ -180,10 +180,13 @@ def _displacement_per_inverse_depth(
     flow: Flow, v: FloatArray, x: Float32Array, y: Float32Array
 ) -> tuple[Float32Array, Float32Array]:
     """Epipolar direction g in px of the grid per frame interval and per 1/m, each of shape (h, w)."""
-    gx, gy = epipolar_direction(x, y, v.astype(np.float32))
+    gx, gy = epipolar_direction(x.astype(np.float64), y.astype(np.float64), v)
+    scale_x, scale_y = flow.intrinsics.fx * flow.period, flow.intrinsics.fy * flow.period
     shape = flow.overlap.shape
-    scale_x, scale_y = np.float32(flow.intrinsics.fx * flow.period), np.float32(flow.intrinsics.fy * flow.period)
-    return np.broadcast_to(gx * scale_x, shape), np.broadcast_to(gy * scale_y, shape)
+    return (
+        np.broadcast_to((gx * scale_x).astype(np.float32), shape),
+        np.broadcast_to((gy * scale_y).astype(np.float32), shape),
+    )
 
 
 def _pose_noise(flow: Flow, settings: ZeroFlowSettings, inverse_depth: Float32Array | float) -> Float32Array:
@@ -244,12 +247,15 @@ def _cells(p_nearer: Float32Array, supported: MaskArray, moving: MaskArray, sett
     front = np.maximum(decided, moving.astype(np.float32))
     behind = np.where(moving, np.float32(0.0), np.maximum(-decided, 0.0))
     seen = (supported | moving).astype(np.float32)
-    size = (CELLS, CELLS)
-    front, behind, seen = (cv2.resize(a, size, interpolation=cv2.INTER_AREA) for a in (front, behind, seen))
+    planes = (front, front * front, behind, behind * behind, seen)
+    front, front_squared, behind, behind_squared, seen = (
+        cv2.resize(plane, (CELLS, CELLS), interpolation=cv2.INTER_AREA) for plane in planes
+    )
     around = cv2.boxFilter(front, cv2.CV_32F, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    front = np.where(around >= settings.cell_min_front, front * settings.front_weight, 0.0)
-    evidence = front + behind
-    probability = 0.5 + 0.5 * (front - behind) / np.maximum(evidence, 1e-6)
+    bias = np.where(around >= settings.cell_min_front, settings.front_weight, 0.0)
+    evidence = bias * front + behind
+    mean_decided = (bias * front_squared - behind_squared) / np.maximum(evidence, 1e-6)
+    probability = 0.5 + 0.5 * mean_decided
     known = (seen >= settings.cell_min_share) & (evidence > 0.5 * settings.cell_min_share)
     return np.where(known, np.rint(255.0 * probability), UNKNOWN).astype(np.uint8)
 

@@ -44,7 +44,7 @@ def test_a_demo_leaves_video_sheet_episodes_and_summary(tmp_path: Path, envs: li
     assert summary["scenarios"]["mirror"]["successes"] == 1
     assert all(env.closed for env in envs)
     count, _ = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "demo.mp4"))
-    assert count == 4 * (13 + 20)  # every decision and the end, then the outcome stands
+    assert count == 4 * (5 + 10)  # every third of 12 decisions and the end, then the outcome stands
     sheet = cv2.imread(str(tmp_path / "contact_sheet.png"))
     assert sheet.shape[0] == 4 * (31 + 26) + 5 * 4  # one row per episode; frames carry a caption
 

@@ -115,7 +115,7 @@ def test_the_table_has_a_row_per_scenario(tmp_path: Path) -> None:
         (EvaluationConfig(scenarios=("clear", "nowhere")), "unknown scenario 'nowhere'; choose one of clear, opaque,"),
         (EvaluationConfig(policy="best"), "unknown policy 'best'; choose one of .*servo"),
         (EvaluationConfig(sensor_noise="loud"), "unknown sensor noise 'loud'; choose one of ideal, nominal"),
-        (EvaluationConfig(image_size=(8, 320)), "--image-size must be at least"),
+        (EvaluationConfig(image_size=(8, 320)), "--image-size must be within 32..2048"),
         (EvaluationConfig(workers=0), "--workers must be at least 1"),
         (EvaluationConfig(backend="slurm"), "unknown backend 'slurm'; choose one of loky, ray"),
     ],

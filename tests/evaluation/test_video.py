@@ -10,7 +10,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from fixation_gym.evaluation.video import VideoWriter, caption, contact_sheet, evenly_spaced, write_png
+from fixation_gym.evaluation.video import VideoWriter, caption, contact_sheet, evenly_spaced, shrink, write_png
 
 
 def plain(colour: tuple[int, int, int], height: int = 31, width: int = 45) -> np.ndarray:
@@ -18,7 +18,7 @@ def plain(colour: tuple[int, int, int], height: int = 31, width: int = 45) -> np
 
 
 def write_video(path: Path, frames: Iterable[np.ndarray]) -> None:
-    with VideoWriter(path, fps=25) as video:
+    with VideoWriter(path, fps=12.5) as video:
         for frame in frames:
             video.add(frame)
 
@@ -31,7 +31,7 @@ def test_a_video_has_the_frames_and_an_even_size(tmp_path: Path) -> None:
     assert meta["codec"] == "h264"
     assert meta["pix_fmt"].startswith("yuv420p")
     assert meta["size"] == (46, 32)
-    assert meta["fps"] == 25
+    assert meta["fps"] == 12.5
     assert len(frames) == 10
     assert frames[5][:31, :45].mean(axis=(0, 1)) == pytest.approx([220, 100, 20], abs=8)
     assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
@@ -86,6 +86,11 @@ def test_a_caption_stands_above_the_untouched_frame() -> None:
     assert captioned.shape == (66, 200, 3)
     assert np.array_equal(captioned[26:], frame)
     assert captioned[:26].max() > 200
+
+
+def test_shrinking_keeps_proportions_and_never_enlarges() -> None:
+    assert shrink(plain((9, 9, 9), 40, 200), 50).shape == (10, 50, 3)
+    assert shrink(plain((9, 9, 9), 40, 200), 400).shape == (40, 200, 3)
 
 
 def test_evenly_spaced_keeps_first_and_last() -> None:

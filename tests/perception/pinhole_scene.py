@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.geometry.rigid import look_at, matrix_to_pose
+from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, transform
 from fixation_gym.types import Observation
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -49,27 +49,29 @@ class Scene:
         """Image (H, W, 3) uint8, true depth (H, W) m and index of the visible rectangle (H, W)."""
         fine = intrinsics.scaled(intrinsics.height * oversample, intrinsics.width * oversample)
         x, y = fine.grid
-        rays = np.stack([x, y, np.ones_like(x)], -1) @ T_base_cam[:3, :3].T
+        rays = (np.stack([x, y, np.ones_like(x)], -1) @ T_base_cam[:3, :3].T).astype(np.float32)
         image = np.full((*x.shape, 3), 90.0, np.float32)
         depth = np.full(x.shape, np.inf)
         index = np.full(x.shape, -1)
         for number, rectangle in enumerate(self.rectangles):
+            box = _bounding_box(rectangle, T_base_cam, fine)
+            ray = rays[box]
             normal = np.cross(rectangle.half_u, rectangle.half_v)
             with np.errstate(divide="ignore", invalid="ignore"):
-                z = ((rectangle.centre - T_base_cam[:3, 3]) @ normal) / (rays @ normal)
-            local = T_base_cam[:3, 3] + z[..., None] * rays - rectangle.centre
+                z = ((rectangle.centre - T_base_cam[:3, 3]) @ normal) / (ray @ normal)
+            local = T_base_cam[:3, 3] + z[..., None] * ray - rectangle.centre
             u = local @ rectangle.half_u / (rectangle.half_u @ rectangle.half_u)
             v = local @ rectangle.half_v / (rectangle.half_v @ rectangle.half_v)
             inside = u**2 + v**2 < 1 if rectangle.round else (abs(u) < 1) & (abs(v) < 1)
-            hit = inside & (z > 1e-3) & (z < depth)
-            scale = rectangle.texture.shape[0] / rectangle.period
-            map_u = (u * np.linalg.norm(rectangle.half_u) * scale).astype(np.float32)
-            map_v = (v * np.linalg.norm(rectangle.half_v) * scale).astype(np.float32)
+            hit = inside & (z > 1e-3) & (z < depth[box])
             size = rectangle.texture.shape[0]
-            colour = cv2.remap(rectangle.texture, map_u % size, map_v % size, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-            image = np.where(hit[..., None], colour, image)
-            depth = np.where(hit, z, depth)
-            index = np.where(hit, number, index)
+            scale = size / rectangle.period
+            map_u = (u * np.linalg.norm(rectangle.half_u) * scale).astype(np.float32) % size
+            map_v = (v * np.linalg.norm(rectangle.half_v) * scale).astype(np.float32) % size
+            colour = cv2.remap(rectangle.texture, map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+            image[box][hit] = colour[hit]
+            depth[box][hit] = z[hit]
+            index[box][hit] = number
         image = cv2.resize(image, (intrinsics.width, intrinsics.height), interpolation=cv2.INTER_AREA)
         image = image + noise * np.random.default_rng(seed).standard_normal(image.shape)
         middle = oversample // 2
@@ -78,6 +80,18 @@ class Scene:
             depth[middle::oversample, middle::oversample],
             index[middle::oversample, middle::oversample],
         )
+
+
+def _bounding_box(rectangle: Rectangle, T_base_cam, camera: Intrinsics):
+    """Slices of the image part that can show a rectangle; all of it if a corner is not in front of the camera."""
+    signs = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    corners = rectangle.centre + signs @ np.stack([rectangle.half_u, rectangle.half_v])
+    pixels = camera.project(transform(inverse(T_base_cam), corners))
+    if np.isnan(pixels).any():
+        return slice(None), slice(None)
+    low = np.maximum(np.floor(pixels.min(axis=0)), 0).astype(int)
+    high = np.maximum(np.ceil(pixels.max(axis=0)) + 1, 0).astype(int)
+    return slice(low[1], high[1]), slice(low[0], high[0])
 
 
 def observe(scene: Scene, T_base_cam, time: float, intrinsics: Intrinsics, noise: float = 2.0, pose=None):

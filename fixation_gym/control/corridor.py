@@ -1,6 +1,6 @@
 """Which straight approaches to the target are free: geometry of the hand swept along the line of sight.
 
-Used by the scene sampler, so that every scene can be solved, and by the privileged oracle policy.
+Used by the servo on what it has seen, by the scene sampler, so that every scene can be solved, and by the oracle.
 """
 
 from __future__ import annotations
@@ -9,14 +9,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fixation_gym.robot import TOOL_IN_CAMERA
 from fixation_gym.types import FloatArray, MaskArray
 
-# Boxes that enclose fingers, hand, camera and wrist when the finger tips are at the target, in the camera's axes
-# (x right, y down, z forward) with the tips at the origin, m; they extend backwards along the whole approach.
-_FINGERS = np.array([[-0.060, -0.015, -np.inf], [0.060, 0.015, 0.010]])
-_HAND_AND_CAMERA = np.array([[-0.110, -0.090, -np.inf], [0.110, 0.040, -0.040]])
-_WRIST = np.array([[-0.110, -0.100, -np.inf], [0.110, 0.110, -0.150]])
-_SWEEP_LENGTH = 0.40
+# Boxes around the parts of the Panda's hand, in the camera's axes (x right, y down, z forward) with the origin between
+# the finger pads, m; measured on the collision meshes. The last one is the wrist, wherever the arm turns it.
+_PARTS = np.array(
+    [
+        [[-0.067, -0.011, -0.044], [0.067, 0.011, 0.010]],  # fingers
+        [[-0.104, -0.033, -0.123], [0.104, 0.033, -0.031]],  # hand
+        [[-0.046, -0.084, -0.084], [0.046, -0.057, -0.058]],  # camera
+        [[-0.055, -0.045, -0.152], [0.090, 0.045, -0.097]],  # flange
+        [[-0.140, -0.130, -0.285], [0.075, 0.045, -0.152]],  # wrist
+    ]
+)
+_LAST_STRETCH = 0.12
+"""Length of the open-loop motion, m; before it, the target is on the camera's axis and the tool below it."""
+
+
+def _swept_boxes() -> FloatArray:
+    """Boxes swept by every part: on the approach, below the camera's axis, and on the last stretch, shape (n, 2, 3)."""
+    last, approach = _PARTS.copy(), _PARTS.copy()
+    last[:, 0, 2] -= _LAST_STRETCH
+    approach[:, :, 1] += TOOL_IN_CAMERA[1]
+    approach[:, 1, 2] -= _LAST_STRETCH
+    approach[:, 0, 2] = -_SWEEP_LENGTH
+    return np.concatenate([last, approach])
+
+
+_SWEEP_LENGTH = 0.45
+_BOXES = _swept_boxes()
 
 
 @dataclass(frozen=True)
@@ -64,9 +86,20 @@ def free_directions(target: FloatArray, obstacles: list[Box], directions: FloatA
     right /= np.linalg.norm(right, axis=-1, keepdims=True)
     down = np.cross(forward, right)
     axes = np.stack([right, down, forward], axis=1)
-    local = np.einsum("dij,pj->dpi", axes, points)
-    hit = np.zeros(local.shape[:2], dtype=bool)
-    for low, high in (_FINGERS, _HAND_AND_CAMERA, _WRIST):
-        hit |= np.all((local > low - margin) & (local < high + margin), axis=-1)
-    hit &= local[..., 2] > -_SWEEP_LENGTH
-    return ~hit.any(axis=-1)
+    return ~in_corridor(np.einsum("dij,pj->dpi", axes, points), margin).any(axis=-1)
+
+
+def in_corridor(points: FloatArray, margin: float) -> MaskArray:
+    """Tell which points the hand sweeps on its last straight way.
+
+    Args:
+        points: in the camera's axes (x right, y down, z forward) with the origin at the target, shape (..., 3), m.
+        margin: extra room around the hand, m.
+
+    Returns:
+        Mask of shape (...).
+    """
+    hit = np.zeros(points.shape[:-1], dtype=bool)
+    for low, high in _BOXES:
+        hit |= np.all((points > low - margin) & (points < high + margin), axis=-1)
+    return hit

@@ -1,0 +1,127 @@
+"""Short-term memory of things in front: zero-flow evidence of the last seconds, kept where it was seen.
+
+One frame shows only edges that happen to lie across the motion, and what leaves the image is still there. So every
+pixel that is surely in front leaves its 3-D point; points fade within seconds and vanish at once where the camera sees
+through them. Value in, value out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import inverse, transform
+from fixation_gym.perception.zero_flow import ZeroFlow
+from fixation_gym.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class MemorySettings:
+    """How evidence is kept."""
+
+    voxel_m: float = 0.015
+    """Evidence within a cube of this size is one point, m."""
+    min_probability: float = 0.97
+    """A pixel leaves a point if it is in front with this probability."""
+    max_relative_std: float = 0.10
+    """... and if its inverse depth is known to this share."""
+    decay_s: float = 10.0
+    """Time in which evidence fades to 1/e, s."""
+    contradiction: float = 0.6
+    """Factor on the evidence of a point where the camera now sees something behind it."""
+    saturation: float = 8.0
+    """Largest evidence of a point, in frames."""
+    min_evidence: float = 3.0
+    """Points with less are not believed yet, in frames."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObstacleMemory:
+    """Points and how often they were seen."""
+
+    keys: NDArray[np.int64]
+    """Voxel indices, shape (n, 3), unique rows in lexicographic order."""
+    evidence: FloatArray
+    """Frames in which each voxel was in front, faded, shape (n,)."""
+    time: float
+
+    @classmethod
+    def empty(cls, time: float = 0.0) -> ObstacleMemory:
+        """Nothing seen yet."""
+        return cls(np.zeros((0, 3), np.int64), np.zeros(0), time)
+
+
+def remember(
+    memory: ObstacleMemory,
+    zero_flow: ZeroFlow,
+    intrinsics: Intrinsics,
+    T_base_cam: FloatArray,
+    time: float,
+    settings: MemorySettings,
+) -> ObstacleMemory:
+    """Add the evidence of one zero-flow test.
+
+    Args:
+        memory: what is remembered.
+        zero_flow: the test.
+        intrinsics: of its pixel grid.
+        T_base_cam: camera pose at the time of the test, shape (4, 4).
+        time: of the test, s.
+        settings: how evidence is kept.
+    """
+    faded = memory.evidence * np.exp(-max(0.0, time - memory.time) / settings.decay_s)
+    faded = faded * np.where(
+        _seen_through(memory, zero_flow, intrinsics, T_base_cam, settings), settings.contradiction, 1.0
+    )
+    seen = _front_points(zero_flow, intrinsics, T_base_cam, settings)
+    new_keys = np.unique(np.floor(seen / settings.voxel_m).astype(np.int64), axis=0)
+    keys, index = np.unique(np.concatenate([memory.keys, new_keys]), axis=0, return_inverse=True)
+    evidence = np.zeros(len(keys))
+    np.add.at(evidence, index.ravel(), np.concatenate([faded, np.ones(len(new_keys))]))
+    evidence = np.minimum(evidence, settings.saturation)
+    keep = evidence > 0.2
+    return ObstacleMemory(keys[keep], evidence[keep], time)
+
+
+def believed_points(memory: ObstacleMemory, settings: MemorySettings) -> tuple[FloatArray, FloatArray]:
+    """Points with enough evidence, shape (n, 3) in base in m, and their evidence, shape (n,)."""
+    believed = memory.evidence >= settings.min_evidence
+    return (memory.keys[believed] + 0.5) * settings.voxel_m, memory.evidence[believed]
+
+
+def _front_points(
+    zero_flow: ZeroFlow, intrinsics: Intrinsics, T_base_cam: FloatArray, settings: MemorySettings
+) -> FloatArray:
+    """Points of the pixels that are surely in front, shape (n, 3), in base, m."""
+    front = zero_flow.supported & (zero_flow.p_nearer > settings.min_probability)
+    front &= zero_flow.inverse_depth_std < settings.max_relative_std * zero_flow.inverse_depth
+    rows, columns = np.nonzero(front)
+    x, y = intrinsics.grid
+    depth = 1.0 / zero_flow.inverse_depth[rows, columns].astype(np.float64)
+    rays = np.stack([x[rows, columns], y[rows, columns], np.ones(len(rows))], axis=-1)
+    return transform(T_base_cam, rays * depth[:, None])
+
+
+def _seen_through(
+    memory: ObstacleMemory,
+    zero_flow: ZeroFlow,
+    intrinsics: Intrinsics,
+    T_base_cam: FloatArray,
+    settings: MemorySettings,
+) -> NDArray[np.bool_]:
+    """Points at whose pixel the test now sees something clearly behind, shape (n,)."""
+    result = np.zeros(len(memory.keys), dtype=bool)
+    if not len(memory.keys):
+        return result
+    points = transform(inverse(T_base_cam), (memory.keys + 0.5) * settings.voxel_m)
+    with np.errstate(invalid="ignore"):
+        pixels = np.rint(intrinsics.project(points))
+        inside = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
+    columns, rows = pixels[inside].astype(np.int64).T
+    result[inside] = zero_flow.supported[rows, columns] & (
+        zero_flow.p_nearer[rows, columns] < 1.0 - settings.min_probability
+    )
+    return result

@@ -1,0 +1,36 @@
+"""What every policy offers, and what it may say about itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Action = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A policy's own view of the episode, for evaluation."""
+
+    distance_m: float
+    """Depth of the target along the optical axis, m; NaN if unknown."""
+    distance_std_m: float
+    """Its standard deviation, m."""
+    phase: str
+    """What the policy is doing."""
+
+
+class Policy(Protocol):
+    """Chooses actions of ``FixationPick-v0``."""
+
+    def reset(self, seed: int | None = None) -> None:
+        """Forget the last episode."""
+        ...
+
+    def act(self, obs: Mapping[str, Any]) -> Action:
+        """Action of shape (7,) for an observation."""
+        ...

@@ -1,0 +1,1 @@
+"""The paper's servo behaviour: fixate, know the distance, move around what is in the way, grasp."""

@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, pose_to_matrix, transform
+from fixation_gym.geometry.twist import adjoint, exp_twist, mean_twist, skew
+
+RNG = np.random.default_rng(1)
+
+
+def random_pose():
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.random(rng=RNG).as_matrix()
+    matrix[:3, 3] = RNG.normal(size=3)
+    return matrix
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-5, 1e-3, 0.1, 2.9])
+def test_mean_twist_inverts_exp_twist(size):
+    direction = RNG.normal(size=3)
+    twist = np.array([*RNG.normal(size=3), *(size * direction / np.linalg.norm(direction))])
+    start = random_pose()
+    recovered = mean_twist(start, start @ exp_twist(twist, 1.0), 1.0)
+    np.testing.assert_allclose(recovered, twist, atol=1e-7)
+
+
+def test_mean_twist_is_the_rate_of_the_motion():
+    twist = np.array([0.1, -0.2, 0.3, 0.4, 0.5, -0.6])
+    np.testing.assert_allclose(mean_twist(np.eye(4), exp_twist(twist, 0.08), 0.08), twist, atol=1e-12)
+
+
+@pytest.mark.parametrize("duration", [0.0, -0.04])
+def test_mean_twist_refuses_a_duration_that_is_not_positive(duration):
+    with pytest.raises(ValueError, match="positive"):
+        mean_twist(np.eye(4), np.eye(4), duration)
+
+
+def test_the_adjoint_moves_a_twist_to_another_frame():
+    T_a_b, twist = random_pose(), RNG.normal(size=6)
+    moved = T_a_b @ exp_twist(twist, 1.0) @ inverse(T_a_b)
+    np.testing.assert_allclose(moved, exp_twist(adjoint(T_a_b) @ twist, 1.0), atol=1e-9)
+
+
+def test_skew_is_the_cross_product():
+    a, b = RNG.normal(size=(2, 3))
+    np.testing.assert_allclose(skew(a) @ b, np.cross(a, b))
+
+
+def test_inverse_undoes_a_transform():
+    pose, points = random_pose(), RNG.normal(size=(4, 5, 3))
+    np.testing.assert_allclose(transform(inverse(pose), transform(pose, points)), points, atol=1e-12)
+
+
+def test_pose_vectors_and_matrices_are_the_same_thing():
+    pose = random_pose()
+    vector = matrix_to_pose(pose)
+    assert vector[3] >= 0
+    np.testing.assert_allclose(pose_to_matrix(vector), pose, atol=1e-12)
+    np.testing.assert_allclose(
+        pose_to_matrix([0, 0, 0, np.sqrt(0.5), 0, 0, np.sqrt(0.5)])[:3, 0], [0, 1, 0], atol=1e-12
+    )
+
+
+def test_look_at_puts_the_target_on_the_optical_axis_with_up_at_the_top():
+    pose = look_at(np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.5, 1.0]), np.array([0.0, 0.0, 1.0]))
+    in_camera = transform(inverse(pose), np.array([2.0, 2.5, 1.0]))
+    np.testing.assert_allclose(in_camera[:2], 0, atol=1e-12)
+    assert in_camera[2] > 0
+    assert np.linalg.det(pose[:3, :3]) == pytest.approx(1.0)
+    assert pose[2, 1] < 0  # image y points down
+
+
+def test_look_at_refuses_a_line_of_sight_along_up():
+    with pytest.raises(ValueError, match="parallel"):
+        look_at(np.zeros(3), np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 1.0]))

@@ -1,0 +1,66 @@
+"""Who may import whom, checked in the source and by importing with modules blocked."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SIMULATOR_FILES = {"fixation_gym/envs/robosuite_backend.py", "fixation_gym/envs/rendering.py"}
+FORBIDDEN = {
+    "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
+    "fixation_gym/control": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
+    "fixation_gym/perception": (
+        "gymnasium",
+        "mujoco",
+        "robosuite",
+        "torch",
+        "fixation_gym.envs",
+        "fixation_gym.control",
+    ),
+    "policies/servo": ("gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.envs", "fixation_gym.evaluation"),
+    "fixation_gym/envs": ("torch", "fixation_gym.evaluation", "policies"),
+}
+FORBIDDEN["fixation_gym/geometry"] += ("fixation_gym.control", "fixation_gym.envs")
+FORBIDDEN["fixation_gym/control"] += ("fixation_gym.envs",)
+
+
+def imported_modules(path: Path) -> set[str]:
+    modules = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            modules |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return modules
+
+
+@pytest.mark.parametrize("package", FORBIDDEN)
+def test_packages_import_only_what_they_may(package):
+    for path in (ROOT / package).rglob("*.py"):
+        for module in imported_modules(path):
+            broken = [name for name in FORBIDDEN[package] if module == name or module.startswith(f"{name}.")]
+            assert not broken, f"{path.relative_to(ROOT)} imports {module}"
+
+
+def test_only_the_backend_and_the_renderer_import_robosuite():
+    for path in (ROOT / "fixation_gym").rglob("*.py"):
+        if str(path.relative_to(ROOT)) not in SIMULATOR_FILES:
+            assert not any(module.split(".")[0] == "robosuite" for module in imported_modules(path)), path
+
+
+@pytest.mark.parametrize(
+    ("module", "blocked"),
+    [
+        ("fixation_gym", ("mujoco", "robosuite", "torch")),
+        ("fixation_gym.perception.pipeline", ("mujoco", "robosuite", "torch")),
+        ("policies.servo.servo_policy", ("mujoco", "robosuite", "torch")),
+        ("fixation_gym.envs.pick_env", ("mujoco", "robosuite", "torch")),
+    ],
+)
+def test_modules_import_without_simulator_and_torch(module, blocked):
+    code = f"import sys\nfor name in {blocked!r}: sys.modules[name] = None\nimport {module}"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert result.returncode == 0, result.stderr
