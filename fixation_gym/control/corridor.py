@@ -49,7 +49,7 @@ class Box:
     half_extent: FloatArray
     yaw: float
 
-    def surface_points(self, spacing: float = 0.02) -> FloatArray:
+    def surface_points(self, spacing: float = 0.03) -> FloatArray:
         """Points on the box surface and inside, shape (n, 3), m; ``spacing`` is well below the width of a finger."""
         axes = [np.linspace(-h, h, max(2, int(np.ceil(2.0 * h / spacing)) + 1)) for h in self.half_extent]
         local = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fixation_gym.envs.robosuite_backend import PickSim
 
 RENDER_VIEWS = ("wrist", "front", "overlay")
-_FRONT_SIZE = (480, 640)
+_FRONT_SIZE = (360, 480)
 
 
 class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):

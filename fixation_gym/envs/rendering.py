@@ -50,8 +50,9 @@ class View:
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
-        # The robot is behind its wrist camera; only a mirror shows it.
-        self._option.geomgroup[scene_mjcf.ROBOT_GROUP] = int(self._full_quality or with_reflections)
+        # The robot is behind its wrist camera; only a mirror shows it, where a coarse one does.
+        self._option.geomgroup[scene_mjcf.ROBOT_GROUP] = int(self._full_quality)
+        self._option.geomgroup[scene_mjcf.STAND_IN_GROUP] = int(with_reflections and not self._full_quality)
         self._renderer.update_scene(self._data, self._camera, self._option)
         flags = self._renderer.scene.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW] = int(self._full_quality)

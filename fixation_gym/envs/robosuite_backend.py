@@ -14,25 +14,28 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import robosuite.macros
 from scipy.spatial.transform import Rotation
 
-robosuite.macros.CONSOLE_LOGGING_LEVEL = "ERROR"
-logging.getLogger("robosuite_logs").setLevel(logging.ERROR)
+from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
+from fixation_gym.envs import scene_mjcf
+from fixation_gym.envs.config import COLLISION_FORCE
+from fixation_gym.envs.scene import SceneSpec
+from fixation_gym.envs.scene_loader import SceneLoader
+from fixation_gym.geometry.rigid import look_at
+from fixation_gym.robot import HAND_EYE, TOOL_IN_HAND
+from fixation_gym.types import FloatArray
 
+# On import robosuite warns of optional parts (other robots, whole-body IK) that are not used here.
+_disabled_before = logging.root.manager.disable
+logging.disable(logging.WARNING)
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv  # noqa: E402
 from robosuite.models.arenas import TableArena  # noqa: E402
 from robosuite.models.tasks import ManipulationTask  # noqa: E402
+from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER  # noqa: E402
 from robosuite.utils.mjcf_utils import xml_path_completion  # noqa: E402
 
-from fixation_gym.control.resolved_rate import JointLimits, joint_velocities  # noqa: E402
-from fixation_gym.envs import scene_mjcf  # noqa: E402
-from fixation_gym.envs.config import COLLISION_FORCE  # noqa: E402
-from fixation_gym.envs.scene import SceneSpec  # noqa: E402
-from fixation_gym.envs.scene_loader import SceneLoader  # noqa: E402
-from fixation_gym.geometry.rigid import look_at  # noqa: E402
-from fixation_gym.robot import HAND_EYE, TOOL_IN_HAND  # noqa: E402
-from fixation_gym.types import FloatArray  # noqa: E402
+logging.disable(_disabled_before)
+ROBOSUITE_DEFAULT_LOGGER.setLevel(logging.ERROR)
 
 _TABLE_SIZE = (0.8, 0.8, 0.05)
 _TABLE_OFFSET = (0.0, 0.0, 0.8)
@@ -138,10 +141,14 @@ class PickSim:
         return owner
 
     def _group_robot_geoms(self) -> None:
-        """Give the robot's looks a group of their own: the wrist camera sees them in a mirror only."""
-        for geom in np.flatnonzero(self.model.geom_group == scene_mjcf.VISIBLE_GROUP):
-            if self.model.body(self.model.geom_bodyid[geom]).name.startswith(_ROBOT_BODIES):
-                self.model.geom_group[geom] = scene_mjcf.ROBOT_GROUP
+        """Sort the robot's geoms into its looks (182,000 faces) and their low-poly stand-ins, the collision shapes."""
+        model = self.model
+        for geom in np.flatnonzero(self._geom_owner == _ROBOT):
+            if model.geom_group[geom] == scene_mjcf.VISIBLE_GROUP:
+                model.geom_group[geom] = scene_mjcf.ROBOT_GROUP
+            else:
+                model.geom_group[geom] = scene_mjcf.STAND_IN_GROUP
+                model.geom_rgba[geom] = (0.85, 0.86, 0.88, 1.0)
 
     # -- reset and step ------------------------------------------------------------------------------------------
 
@@ -289,6 +296,16 @@ class PickSim:
             i, j = np.unravel_index(flat, gaps.shape)
             if gaps[i, j] >= nearest:
                 break
-            distance = mujoco.mj_geomDistance(model, data, int(robot[i]), int(obstacle[j]), nearest, None)
-            nearest = min(nearest, float(distance))
+            nearest = min(nearest, self._geom_distance(int(robot[i]), int(obstacle[j]), nearest))
         return nearest
+
+    def _geom_distance(self, first: int, second: int, largest: float) -> float:
+        model, data = self.model, self.data
+        distance = mujoco.mj_geomDistance(model, data, first, second, largest, None)
+        if distance == 0.0:
+            # MuJoCo 3.9's own convex routine says exactly 0 for some pairs that are far apart; libccd does not.
+            flags = model.opt.disableflags
+            model.opt.disableflags = flags | mujoco.mjtDisableBit.mjDSBL_NATIVECCD
+            distance = mujoco.mj_geomDistance(model, data, first, second, largest, None)
+            model.opt.disableflags = flags
+        return float(distance)

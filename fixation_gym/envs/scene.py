@@ -21,6 +21,8 @@ APPROACH_ELEVATIONS = np.radians(np.linspace(45.0, 83.0, 5))
 """Directions, relative to the bearing of the target, from which the arm can reach it; one must be free of obstacles."""
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
 _CLEARANCE = 0.015
+_LEAST_FREE = 0.3
+"""Least share of the reachable directions that must be free with ``_CLEARANCE`` m to spare."""
 _ATTEMPTS = 500
 
 
@@ -104,12 +106,11 @@ def _propose(scenario: Scenario, rng: np.random.Generator) -> SceneSpec | None:
         if not _has_room(obstacle, centre, obstacles):
             return None
         obstacles.append(obstacle)
-    directions = reachable_directions(centre)
     boxes = [obstacle.box for obstacle in obstacles]
-    if not free_directions(centre, boxes, directions, _CLEARANCE).any():
-        return None
     start = (camera - centre) / np.linalg.norm(camera - centre)
     if boxes and free_directions(centre, boxes, start[None], 0.0)[0]:
+        return None
+    if free_directions(centre, boxes, reachable_directions(centre), _CLEARANCE).mean() < _LEAST_FREE:
         return None
     light = rng.uniform(-0.5, 0.5, 2)
     return SceneSpec(
@@ -155,10 +156,10 @@ def _sample_obstacle(
     scale = float(rng.uniform(0.8, 1.0))
     to_camera = math.atan2(camera[1] - centre[1], camera[0] - centre[0])
     if across:
-        angle, radius = to_camera, rng.uniform(0.11, 0.17)
+        angle, radius = to_camera, rng.uniform(0.13, 0.20)
         side = _sideways_offset(kind, shape, scale, rng)
     else:
-        angle, radius = to_camera + rng.uniform(-2.4, 2.4), rng.uniform(0.13, 0.24)
+        angle, radius = to_camera + rng.uniform(-2.8, 2.8), rng.uniform(0.17, 0.28)
         side = 0.0
     radial, lateral = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
     x, y = centre[:2] + radius * radial + side * lateral

@@ -11,8 +11,8 @@ from fixation_gym.robot import CAMERA_FOVY, CAMERA_IN_HAND
 
 CAMERA_NAME = "wrist"
 FRONT_CAMERA_NAME = "front"
-VISIBLE_GROUP, ROBOT_GROUP, HIDDEN_GROUP = 1, 4, 5
-"""Geom groups: what all cameras see, the robot's looks, unused parts of the pool."""
+VISIBLE_GROUP, STAND_IN_GROUP, ROBOT_GROUP, HIDDEN_GROUP = 1, 3, 4, 5
+"""Geom groups: what all cameras see, a coarse robot for mirrors, the robot's looks, unused parts of the pool."""
 _OBJECT_FRICTION = "1.0 0.01 0.001"
 
 TEXTURES = {

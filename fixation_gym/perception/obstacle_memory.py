@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +17,10 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.perception.zero_flow import ZeroFlow
 from fixation_gym.types import FloatArray
+
+
+_NEIGHBOURHOOD = np.ones((5, 5), np.uint8)
+"""Window of the flow, px of its grid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +31,7 @@ class MemorySettings:
     """Evidence within a cube of this size is one point, m."""
     min_probability: float = 0.97
     """A pixel leaves a point if it is in front with this probability."""
-    max_relative_std: float = 0.10
+    max_relative_std: float = 0.05
     """... and if its inverse depth is known to this share."""
     decay_s: float = 10.0
     """Time in which evidence fades to 1/e, s."""
@@ -34,7 +39,7 @@ class MemorySettings:
     """Factor on the evidence of a point where the camera now sees something behind it."""
     saturation: float = 8.0
     """Largest evidence of a point, in frames."""
-    min_evidence: float = 3.0
+    min_evidence: float = 5.0
     """Points with less are not believed yet, in frames."""
 
 
@@ -98,9 +103,11 @@ def _front_points(
     """Points of the pixels that are surely in front, shape (n, 3), in base, m."""
     front = zero_flow.supported & (zero_flow.p_nearer > settings.min_probability)
     front &= zero_flow.inverse_depth_std < settings.max_relative_std * zero_flow.inverse_depth
+    # At an outline the flow's window mixes the thing with what is behind it; the thing is the nearest in sight there.
+    nearest = cv2.dilate(np.where(front, zero_flow.inverse_depth, np.float32(0.0)), _NEIGHBOURHOOD)
     rows, columns = np.nonzero(front)
     x, y = intrinsics.grid
-    depth = 1.0 / zero_flow.inverse_depth[rows, columns].astype(np.float64)
+    depth = 1.0 / nearest[rows, columns].astype(np.float64)
     rays = np.stack([x[rows, columns], y[rows, columns], np.ones(len(rows))], axis=-1)
     return transform(T_base_cam, rays * depth[:, None])
 

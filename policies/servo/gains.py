@@ -20,19 +20,21 @@ class ServoGains:
     """lambda_dist of Eq. 8: speed upwards per metre of Z_f - Z_d, 1/s; grasps from above need less room."""
     climb_until: float = math.radians(65.0)
     """Elevation of the gaze above which the climb ends, rad."""
-    highest_elevation: float = math.radians(78.0)
-    """Obstacles push the gaze up to this elevation at most; beyond the vertical everything turns round, rad."""
+    highest_elevation: float = math.radians(84.0)
+    """Elevation of the gaze at which the arm stops rising; beyond the vertical, up and down change places, rad."""
+    azimuth_range: tuple[float, float] = (math.radians(-5.0), math.radians(80.0))
+    """Azimuths of the gaze, against the direction from base to target, that the arm reaches without strain, rad."""
     cycle_amplitude: float = 0.02
     """Radius of the circle of Eq. 8, m."""
     cycle_rate: float = 2.0
     """Angular rate of the circle, rad/s."""
     obstacle_gain: float = 0.10
     """lambda_obs of Eq. 8: speed away from obstacles, m/s."""
-    obstacle_up: float = 0.6
+    obstacle_up: float = 1.0
     """Share of "up" mixed into the way out, in half hand widths: obstacles stand on the table, none hangs above."""
-    obstacle_margin: float = 0.015
+    obstacle_margin: float = 0.01
     """Room to keep between hand and obstacles, m."""
-    obstacle_evidence: float = 12.0
+    obstacle_evidence: float = 40.0
     """Evidence in the corridor (points times frames) that stops the approach."""
     retreat_gap: float = 0.08
     """An obstacle nearer than this before the finger tips makes the hand retreat, m."""

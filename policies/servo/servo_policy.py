@@ -183,8 +183,7 @@ class ServoPolicy:
             gains.obstacle_gain,
             self._shunned_direction(obstacle) if blocked else np.zeros(2),
         )
-        if elevation > gains.highest_elevation:
-            lateral[1] = max(lateral[1], 0.0)
+        lateral = self._within_reach(lateral, elevation, T_base_cam, fixation.point_base)
         forward = 0.0
         if approaching and not blocked:
             forward = servo_laws.approach_speed(fixation.distance_m, gains.desired_distance, gains.approach_gain)
@@ -194,6 +193,20 @@ class ServoPolicy:
         roll = servo_laws.roll_rate(self._roll_error(percept, T_base_cam), gains.roll_gain)
         w = servo_laws.gaze_rotation(fixation.centroid, gains.gaze_gain, 1.0 / fixation.distance_m, v, roll)
         return np.array([*v, *w, roll])
+
+    def _within_reach(
+        self, lateral: FloatArray, elevation: float, T_base_cam: FloatArray, target: FloatArray
+    ) -> FloatArray:
+        """Lateral velocity without the part that would carry the camera out of the arm's comfortable reach."""
+        gains = self.gains
+        gaze = target - T_base_cam[:3, 3]
+        azimuth = math.atan2(gaze[1], gaze[0]) - math.atan2(target[1], target[0])
+        azimuth = (azimuth + math.pi) % (2.0 * math.pi) - math.pi
+        # Moving right (+x) around the target raises the azimuth, moving up (-y) raises the elevation.
+        low, high = gains.azimuth_range
+        v_x = max(lateral[0], 0.0) if azimuth < low else min(lateral[0], 0.0) if azimuth > high else lateral[0]
+        v_y = max(lateral[1], 0.0) if elevation > gains.highest_elevation else lateral[1]
+        return np.array([v_x, v_y])
 
     def _shunned_direction(self, obstacle: ObstacleTerm) -> FloatArray:
         """obs_xy of unit length; what is straight ahead is passed above."""
@@ -207,7 +220,7 @@ class ServoPolicy:
         if percept.fixation.distance_m < self.gains.align_distance and seen.visible and not seen.touches_border:
             return narrow_axis(seen.mask, roll, self.gains.max_roll)
         # Looking straight down, level is undefined; the correction fades before.
-        return -roll * float(np.hypot(T_base_cam[2, 0], T_base_cam[2, 1]))
+        return -roll * min(1.0, 6.0 * float(np.hypot(T_base_cam[2, 0], T_base_cam[2, 1])))
 
     def _grasping_twist(self, T_base_cam: FloatArray, goal: FloatArray) -> FloatArray:
         """Bring the tool to the target through a funnel: first in line with the approach axis, then forward."""

@@ -38,7 +38,7 @@ def test_the_corridor_is_as_wide_as_the_hand_and_ends_at_the_finger_tips():
 
 
 def test_far_from_the_target_the_hand_comes_below_the_optical_axis():
-    above_and_below = np.array([[0.0, -0.09, -0.30], [0.0, 0.09, -0.30]])
+    above_and_below = np.array([[0.10, -0.05, -0.26], [0.10, 0.09, -0.26]])
     assert in_corridor(above_and_below, 0.0).tolist() == [False, True]
 
 

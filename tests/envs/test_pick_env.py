@@ -1,0 +1,249 @@
+"""Contracts and physics of FixationPick-v0 in the simulator."""
+
+import json
+import subprocess
+import sys
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import fixation_gym
+from fixation_gym.envs.config import SCENARIO_NAMES
+from fixation_gym.geometry.rigid import pose_to_matrix
+from fixation_gym.robot import TWIST_LIMITS
+
+pytestmark = pytest.mark.sim
+SMALL = (64, 80)
+INFO_KEYS = {
+    "is_success",
+    "success",
+    "collision",
+    "clearance_m",
+    "distance_true_m",
+    "fixation_error_px",
+    "reward_terms",
+}
+
+
+@pytest.fixture(scope="module")
+def env():
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=SMALL)
+    yield env
+    env.close()
+
+
+@pytest.fixture(scope="module")
+def ideal_env():
+    env = gym.make("FixationPick-v0", sensor_noise="ideal")
+    yield env
+    env.close()
+
+
+def rollout(env, seed, steps=12):
+    rng = np.random.default_rng(0)
+    obs, _ = env.reset(seed=seed)
+    trail = [obs]
+    for _ in range(steps):
+        obs, reward, *_ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+        trail.append({**obs, "reward": np.array(reward)})
+    return trail
+
+
+def assert_same(first, second):
+    for a, b in zip(first, second, strict=True):
+        for key in a:
+            np.testing.assert_array_equal(a[key], b[key], err_msg=key)
+
+
+def test_the_environment_passes_gymnasiums_checker(env):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_the_environment_passes_stable_baselines_checker(env):
+    from stable_baselines3.common.env_checker import check_env as check_sb3_env
+
+    check_sb3_env(env.unwrapped, warn=False)
+    assert env.unwrapped.spec.max_episode_steps == 625
+
+
+def test_the_same_seed_gives_the_same_trajectory_bit_by_bit_after_another_episode(env):
+    first = rollout(env, seed=4)
+    rollout(env, seed=9)
+    assert_same(first, rollout(env, seed=4))
+
+
+def test_another_process_gives_the_same_trajectory(env):
+    code = (
+        "import json, numpy as np, gymnasium as gym, fixation_gym\n"
+        f"env = gym.make('FixationPick-v0', scenario='opaque', image_size={SMALL})\n"
+        "obs, _ = env.reset(seed=4)\n"
+        "for _ in range(8): obs, *_ = env.step(np.full(7, 0.3, np.float32))\n"
+        "print(json.dumps({k: int(v.sum()) if k == 'rgb' else v.tolist() for k, v in obs.items()}))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    obs, _ = env.reset(seed=4)
+    for _ in range(8):
+        obs, *_ = env.step(np.full(7, 0.3, np.float32))
+    other = json.loads(result.stdout.splitlines()[-1])
+    assert other.pop("rgb") == int(obs["rgb"].sum())
+    for key, value in other.items():
+        assert value == obs[key].tolist(), key
+
+
+def test_seeds_change_target_and_obstacles(env):
+    scenes = []
+    for seed in (0, 1):
+        env.reset(seed=seed)
+        scenes.append(env.unwrapped.scene)
+    assert scenes[0].target.position != scenes[1].target.position
+    assert scenes[0].obstacles != scenes[1].obstacles
+
+
+def test_reset_and_step_give_the_same_info_keys_and_terms_that_sum_to_the_reward(env):
+    _, info = env.reset(seed=0)
+    assert set(info) == INFO_KEYS
+    _, reward, terminated, truncated, after = env.step(np.zeros(7, np.float32))
+    assert set(after) == INFO_KEYS
+    assert set(after["reward_terms"]) == set(info["reward_terms"])
+    assert sum(after["reward_terms"].values()) == pytest.approx(reward)
+    assert (terminated, truncated) == (False, False)
+
+
+@pytest.mark.parametrize(
+    "action", [np.full(7, np.nan), np.zeros(6), np.zeros((1, 7)), np.array([np.inf, 0, 0, 0, 0, 0, 0])]
+)
+def test_bad_actions_are_refused_with_what_is_allowed(env, action):
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="7 finite numbers"):
+        env.unwrapped.step(action)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"scenario": "fog"}, "clear, opaque, translucent, mirror"),
+        ({"image_size": (0, 320)}, "height, width"),
+        ({"image_size": "big"}, "height, width"),
+        ({"sensor_noise": "none"}, "nominal"),
+        ({"control_frequency": 30}, "10, 20, 25, 50 or 100"),
+        ({"render_mode": "ansi"}, "rgb_array"),
+        ({"render_view": "top"}, "overlay"),
+        ({"reward": "huge"}, "dense"),
+    ],
+)
+def test_bad_arguments_are_refused_before_anything_is_built(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        gym.make("FixationPick-v0", **arguments)
+
+
+def test_the_camera_follows_a_commanded_circle_within_five_percent(ideal_env):
+    ideal_env.reset(seed=3)
+    commanded, measured = [], []
+    for k in range(120):
+        phase = 2.0 * k / 25.0
+        v = 0.05 * np.array([np.cos(phase), np.sin(phase), 0.0])
+        twist = np.array([*v, v[1] / 0.45, -v[0] / 0.45, 0.0])
+        obs, *_ = ideal_env.step(np.array([*twist / TWIST_LIMITS, -1.0], np.float32))
+        commanded.append(twist)
+        measured.append(obs["camera_twist"])
+    error = np.array(measured)[10:] - np.array(commanded)[10:]
+    for part in (slice(0, 3), slice(3, 6)):
+        assert np.linalg.norm(error[:, part]) < 0.05 * np.linalg.norm(np.array(commanded)[10:, part])
+
+
+def test_measured_twist_is_the_rate_of_the_measured_pose(ideal_env):
+    ideal_env.reset(seed=5)
+    action = np.array([0.3, -0.2, 0.4, 0.1, 0.2, -0.3, -1.0], np.float32)
+    for _ in range(12):
+        before, *_ = ideal_env.step(action)
+    after, *_ = ideal_env.step(action)
+    T_before, T_after = pose_to_matrix(before["camera_pose"]), pose_to_matrix(after["camera_pose"])
+    mean_velocity = T_before[:3, :3].T @ (T_after[:3, 3] - T_before[:3, 3]) * 25.0
+    assert mean_velocity == pytest.approx(after["camera_twist"][:3], abs=2e-3)
+
+
+def test_a_point_projects_onto_its_rendered_blob_within_a_pixel():
+    # The ball's silhouette centre lies near the projection of its centre.
+    scenario = {"target_shapes": ["ball"], "grasp_width": [0.03, 0.03]}
+    env = gym.make("FixationPick-v0", scenario=scenario, sensor_noise="ideal")
+    for seed in range(3):
+        obs, _ = env.reset(seed=seed)
+        rgb = obs["rgb"].astype(int)
+        rows, columns = np.nonzero((rgb[..., 0] > 90) & (rgb[..., 1] < 50) & (rgb[..., 2] < 50))
+        T_base_cam = pose_to_matrix(np.float64(obs["camera_pose"]))
+        centre = env.unwrapped.sim.body_position("target")
+        pixel = env.unwrapped.intrinsics.project(T_base_cam[:3, :3].T @ (centre - T_base_cam[:3, 3]))
+        blob = [0.5 * (columns.min() + columns.max()), 0.5 * (rows.min() + rows.max())]
+        assert pixel == pytest.approx(blob, abs=1.0)
+    env.close()
+
+
+def test_the_wrist_camera_does_not_see_the_robot(ideal_env):
+    ideal_env.reset(seed=2)
+    unwrapped = ideal_env.unwrapped
+    hidden = unwrapped._image("observation", unwrapped.data.qpos)
+    with_robot = unwrapped._image("wrist", unwrapped.data.qpos)
+    difference = np.abs(hidden.astype(int) - with_robot.astype(int)).max(axis=-1)
+    assert np.mean(difference > 60) < 0.01  # shadows differ, a finger in view would be large
+
+
+@pytest.mark.parametrize("scenario", SCENARIO_NAMES)
+def test_objects_rest_where_the_scene_puts_them(scenario):
+    env = gym.make("FixationPick-v0", scenario=scenario, image_size=SMALL)
+    for seed in range(3):
+        env.reset(seed=seed)
+        for _ in range(15):
+            _, _, _, _, info = env.step(np.zeros(7, np.float32))
+        sim, scene = env.unwrapped.sim, env.unwrapped.scene
+        assert np.linalg.norm(sim.body_position("target") - scene.target.position) < 2e-3
+        assert sim.obstacle_push() < 2e-3
+        assert not info["collision"]
+        if scene.obstacles:
+            assert 0.0 < info["clearance_m"] < 0.5
+    env.close()
+
+
+def test_pushing_an_obstacle_counts_as_a_collision(env):
+    env.reset(seed=0)
+    sim = env.unwrapped.sim
+    body = sim.obstacles[0]
+    sim.data.joint(f"{body}_joint").qpos[0] += 0.05
+    _, reward, _, _, info = env.step(np.zeros(7, np.float32))
+    assert info["collision"]
+    assert info["reward_terms"]["collision"] < 0.0
+    assert reward < -4.0
+
+
+def test_nothing_private_reaches_the_observation(env):
+    obs, _ = env.reset(seed=0)
+    assert set(obs) == {"rgb", "joint_pos", "joint_vel", "gripper_width", "camera_pose", "camera_twist", "time"}
+    assert env.observation_space.contains(obs)
+
+
+def test_observations_do_not_share_memory(env):
+    first, _ = env.reset(seed=0)
+    copies = {key: value.copy() for key, value in first.items()}
+    env.step(np.ones(7, np.float32))
+    for key, value in copies.items():
+        np.testing.assert_array_equal(first[key], value)
+
+
+@pytest.mark.parametrize("view", ["wrist", "front", "overlay"])
+def test_rendered_views_show_something(view):
+    env = gym.make("FixationPick-v0", image_size=SMALL, render_mode="rgb_array", render_view=view)
+    env.reset(seed=0)
+    frame = env.render()
+    assert frame.dtype == np.uint8
+    assert frame.ndim == 3
+    assert frame.std() > 10.0
+    env.close()
+    env.close()
+
+
+def test_importing_the_package_registers_the_environment():
+    assert fixation_gym.__name__ in gym.spec("FixationPick-v0").entry_point
