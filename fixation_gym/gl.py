@@ -6,6 +6,7 @@ So ``select_backend`` has to run before either is imported.
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
@@ -25,6 +26,7 @@ PROBE_MODEL = """
 """
 
 _CHECKED = "FIXATION_GYM_GL"  # the backend that was seen working; child processes inherit it and do not probe again
+_CONTEXT_MODULE = "mujoco.rendering.classic.gl_context"
 _PROBE_TIMEOUT_S = 60.0  # EGL can hang when many processes share one GPU
 _PROBE = f"""
 import mujoco
@@ -67,6 +69,9 @@ def select_backend() -> str:
             f"no GL library renders here; on Debian or Ubuntu: apt-get install {' '.join(DEBIAN_PACKAGES)}"
         )
     os.environ.update(backend_environment(backend), **{_CHECKED: backend})
+    if not chosen and _CONTEXT_MODULE in sys.modules:
+        # MuJoCo was imported first and took its default, a window; now it reads MUJOCO_GL again.
+        importlib.reload(sys.modules[_CONTEXT_MODULE])
     return backend
 
 

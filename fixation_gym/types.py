@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+FloatArray = NDArray[np.floating[Any]]
+"""Real numbers; float64 unless said otherwise."""
 ImageArray = NDArray[np.uint8]
 MaskArray = NDArray[np.bool_]
 

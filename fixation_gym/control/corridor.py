@@ -99,7 +99,8 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
     Returns:
         Mask of shape (...).
     """
-    hit = np.zeros(points.shape[:-1], dtype=bool)
+    hit: MaskArray = np.zeros(points.shape[:-1], dtype=np.bool_)
     for low, high in _BOXES:
-        hit |= np.all((points > low - margin) & (points < high + margin), axis=-1)
+        inside = np.all((points > low - margin) & (points < high + margin), axis=-1)
+        np.logical_or(hit, inside, out=hit)
     return hit

@@ -43,7 +43,7 @@ class EpisodeResult:
     distance_error_at_grasp_m: float | None
     """Absolute error of the last distance estimate of the approach that ended in a grasp, m."""
     distance_mae_m: float | None
-    """Mean absolute error over all steps with a distance estimate, m."""
+    """Mean absolute error of the distance estimate while the gaze is held, m."""
     fixation_rms_px: float | None
     """Root mean square of the target's offset from the image centre while the gaze is held, px."""
     min_clearance_m: float | None
@@ -120,6 +120,7 @@ def run_episode(
     if on_frame is not None:
         on_frame(_render(env))
     success, collision = bool(info["is_success"]), bool(info["collision"])
+    gazing = [step for step in steps if step.phase is None or step.phase in GAZE_PHASES]
     return EpisodeResult(
         scenario=scenario,
         policy=policy_name,
@@ -133,10 +134,8 @@ def run_episode(
         reward_terms=reward_terms,
         final_phase=steps[-1].phase,
         distance_error_at_grasp_m=error_at_grasp(steps),
-        distance_mae_m=mean(step.distance_error_m for step in steps),
-        fixation_rms_px=root_mean_square(
-            step.fixation_error_px for step in steps if step.phase is None or step.phase in GAZE_PHASES
-        ),
+        distance_mae_m=mean(step.distance_error_m for step in gazing),
+        fixation_rms_px=root_mean_square(step.fixation_error_px for step in gazing),
         min_clearance_m=minimum(clearances),
     )
 

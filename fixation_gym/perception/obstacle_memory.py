@@ -18,7 +18,6 @@ from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.perception.zero_flow import ZeroFlow
 from fixation_gym.types import FloatArray
 
-
 _NEIGHBOURHOOD = np.ones((5, 5), np.uint8)
 """Window of the flow, px of its grid."""
 

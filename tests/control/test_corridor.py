@@ -25,7 +25,7 @@ def test_everything_is_free_without_obstacles():
 
 
 def test_a_post_between_camera_and_target_blocks_that_direction_only():
-    post = Box(TARGET + [-0.15, 0.0, 0.0], np.array([0.02, 0.02, 0.15]), 0.0)
+    post = Box(TARGET - np.array([0.15, 0.0, 0.0]), np.array([0.02, 0.02, 0.15]), 0.0)
     from_robot, from_side = approach_directions(np.radians([0.0, 90.0]), np.radians([45.0]))
     free = free_directions(TARGET, [post], np.stack([from_robot, from_side]), 0.0)
     assert free.tolist() == [False, True]
