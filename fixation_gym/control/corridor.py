@@ -86,7 +86,8 @@ def free_directions(target: FloatArray, obstacles: list[Box], directions: FloatA
     right /= np.linalg.norm(right, axis=-1, keepdims=True)
     down = np.cross(forward, right)
     axes = np.stack([right, down, forward], axis=1)
-    return ~in_corridor(np.einsum("dij,pj->dpi", axes, points), margin).any(axis=-1)
+    hit = in_corridor(np.einsum("dij,pj->dpi", axes, points), margin)
+    return np.asarray(~np.any(hit, axis=-1))
 
 
 def in_corridor(points: FloatArray, margin: float) -> MaskArray:

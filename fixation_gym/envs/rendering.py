@@ -27,8 +27,8 @@ class View:
             width: image columns, px.
             full_quality: with robot and shadows, for people; otherwise what the wrist camera needs.
         """
-        model.vis.global_.offheight = max(model.vis.global_.offheight, height)
-        model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
+        # The context takes its buffer size from the model; a larger one costs time in every frame.
+        model.vis.global_.offheight, model.vis.global_.offwidth = height, width
         # Perception needs anti-aliasing: without it static edges flicker and read as motion.
         model.vis.quality.offsamples = 4
         model.vis.quality.shadowsize = 1024

@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import look_at
+from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
+from fixation_gym.perception.zero_flow import ZeroFlow, unknown_zero_flow
+
+CAMERA = Intrinsics.from_fovy(40, 60, 0.74)
+SETTINGS = MemorySettings()
+POSE = look_at(np.array([0.0, 0.0, 0.5]), np.array([0.5, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+
+
+def patch(p_nearer: float, depth: float = 0.3, relative_std: float = 0.02, half: int = 5) -> ZeroFlow:
+    """A test that has evidence in a square patch in the image centre."""
+    empty = unknown_zero_flow(40, 60)
+    probability, inverse_depth, std = (a.copy() for a in (empty.p_nearer, empty.inverse_depth, empty.inverse_depth_std))
+    supported = empty.supported.copy()
+    where = np.s_[20 - half : 20 + half, 30 - half : 30 + half]
+    probability[where], inverse_depth[where], std[where] = p_nearer, 1.0 / depth, relative_std / depth
+    supported[where] = True
+    return ZeroFlow(probability, supported, empty.moving, empty.cells, inverse_depth, std)
+
+
+def see(zero_flow, frames, memory=None, start=0.0):
+    memory = memory or ObstacleMemory.empty()
+    for k in range(frames):
+        memory = remember(memory, zero_flow, CAMERA, POSE, start + 0.04 * k, SETTINGS)
+    return memory
+
+
+def test_what_is_in_front_for_several_frames_is_remembered_where_it_is():
+    points, evidence = believed_points(see(patch(1.0), 7), SETTINGS)
+    assert len(points) > 3
+    assert evidence.min() >= SETTINGS.min_evidence
+    in_camera = (points - POSE[:3, 3]) @ POSE[:3, :3]
+    assert in_camera[:, 2] == pytest.approx(np.full(len(points), 0.3), abs=SETTINGS.voxel_m)
+    assert np.abs(in_camera[:, :2]).max() < 0.06
+
+
+def test_a_single_frame_a_doubtful_or_an_inexact_one_is_not_believed():
+    for zero_flow, frames in ((patch(1.0), 1), (patch(0.9), 20), (patch(1.0, relative_std=0.3), 20)):
+        points, _ = believed_points(see(zero_flow, frames), SETTINGS)
+        assert len(points) == 0
+
+
+def test_what_the_camera_sees_through_is_forgotten_at_once():
+    memory = see(patch(1.0), 8)
+    memory = see(patch(0.0, depth=0.9, half=9), 8, memory, start=0.4)
+    assert len(believed_points(memory, SETTINGS)[0]) == 0
+
+
+def test_what_is_no_longer_seen_fades_within_a_few_decay_times():
+    memory = see(patch(1.0), 8)
+    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, POSE, 0.5 + 0.2 * SETTINGS.decay_s, SETTINGS)
+    assert len(believed_points(later, SETTINGS)[0]) > 0
+    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, POSE, 3.0 * SETTINGS.decay_s, SETTINGS)
+    assert len(believed_points(later, SETTINGS)[0]) == 0

@@ -1,0 +1,94 @@
+"""The servo in closed loop on an ideal kinematic camera: perception and laws without a simulator."""
+
+import numpy as np
+import pytest
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import look_at, matrix_to_pose
+from fixation_gym.geometry.twist import exp_twist
+from fixation_gym.robot import CAMERA_FOVY, TOOL_IN_CAMERA
+from fixation_gym.types import Observation
+from policies.servo.servo_policy import ServoPolicy
+
+INTRINSICS = Intrinsics.from_fovy(120, 160, CAMERA_FOVY)
+TARGET = np.array([0.55, 0.0, 0.0])
+RADIUS = 0.025
+UP = np.array([0.0, 0.0, 1.0])
+PERIOD = 0.04
+
+
+def picture(T_base_cam):
+    """A red ball before a grey wall, exactly projected: a pixel is red if its ray meets the ball."""
+    x, y = INTRINSICS.grid
+    rays = np.stack([x, y, np.ones_like(x)], -1) @ T_base_cam[:3, :3].T
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    offset = TARGET - T_base_cam[:3, 3]
+    along = rays @ offset
+    hit = (along > 0) & (offset @ offset - along**2 < RADIUS**2)
+    return np.where(hit[..., None], np.array([200, 10, 10]), 128).astype(np.uint8)
+
+
+def run(policy, T_base_cam, seconds, visible=lambda time: True):
+    twist, trail = np.zeros(6), []
+    for k in range(round(seconds / PERIOD)):
+        time = k * PERIOD
+        image = picture(T_base_cam) if visible(time) else np.full((120, 160, 3), 128, np.uint8)
+        observation = Observation(
+            time=time,
+            rgb=image,
+            joint_pos=np.zeros(7),
+            joint_vel=np.zeros(7),
+            camera_pose=matrix_to_pose(T_base_cam),
+            camera_twist=twist,
+            gripper_width=0.08 if policy.estimate is None or policy.estimate.phase != "lift" else 0.05,
+        )
+        policy.percept = policy._perception.update(observation)
+        twist = policy.command(policy.percept, observation).camera_twist
+        trail.append((time, policy.estimate, T_base_cam))
+        T_base_cam = T_base_cam @ exp_twist(twist, PERIOD)
+    return trail
+
+
+@pytest.fixture
+def start():
+    return look_at(np.array([0.30, -0.20, 0.30]), TARGET + [0.03, 0.02, 0.0], UP)
+
+
+@pytest.fixture
+def policy():
+    return ServoPolicy(INTRINSICS, support_height_m=None)
+
+
+def test_the_gaze_reaches_and_holds_the_target(policy, start):
+    for time, _, T_base_cam in run(policy, start, 4.0):
+        point = T_base_cam[:3, :3].T @ (TARGET - T_base_cam[:3, 3])
+        if time > 2.0:
+            assert np.linalg.norm(point[:2] / point[2]) < 0.02
+
+
+def test_the_distance_is_known_within_two_percent_before_the_approach(policy, start):
+    trail = run(policy, start, 4.0)
+    _, estimate, T_base_cam = next(item for item in trail if item[1].phase == "approach")
+    true = T_base_cam[:3, 2] @ (TARGET - T_base_cam[:3, 3])
+    assert estimate.distance_m == pytest.approx(true, rel=0.02)
+
+
+def test_the_tool_ends_at_the_target(policy, start):
+    trail = run(policy, start, 16.0)
+    T_base_cam = next(pose for _, estimate, pose in trail if estimate.phase == "close")
+    tool = T_base_cam[:3, :3] @ TOOL_IN_CAMERA + T_base_cam[:3, 3]
+    assert np.linalg.norm(tool - TARGET) < 0.012
+
+
+def test_a_lost_target_is_recovered(policy, start):
+    trail = run(policy, start, 9.0, visible=lambda time: not 2.0 < time < 4.0)
+    phases = [estimate.phase for _, estimate, _ in trail]
+    lost = phases[round(3.0 / PERIOD) : round(4.0 / PERIOD)]
+    assert set(lost) <= {"recover", "search"}
+    assert phases[-1] in ("fixate", "approach", "grasp")
+
+
+def test_commands_stay_within_the_limits_and_are_repeatable(policy, start):
+    first = [estimate for _, estimate, _ in run(policy, start, 3.0)]
+    policy.reset()
+    assert first == [estimate for _, estimate, _ in run(policy, start, 3.0)]

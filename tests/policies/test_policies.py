@@ -1,0 +1,57 @@
+"""Policies in the simulator, and the catalogue."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import fixation_gym  # noqa: F401
+from fixation_gym.envs.config import SCENARIO_NAMES
+from policies.baselines import RandomPolicy
+from policies.catalogue import POLICY_NAMES, make_policy
+
+
+def play(env, policy, seed):
+    obs, _ = env.reset(seed=seed)
+    policy.reset(seed)
+    errors, done = [], False
+    while not done:
+        action = policy.act(obs)
+        assert env.action_space.contains(action)
+        obs, _, terminated, truncated, info = env.step(action)
+        errors.append((policy.estimate.phase, policy.estimate.distance_m))
+        done = terminated or truncated
+    return info
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("scenario", SCENARIO_NAMES)
+def test_the_servo_picks_without_collision(scenario):
+    env = gym.make("FixationPick-v0", scenario=scenario)
+    info = play(env, make_policy("servo", env), seed=500_002)
+    env.close()
+    assert info["is_success"]
+    assert not info["collision"]
+
+
+@pytest.mark.sim
+def test_the_oracle_picks_without_collision():
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=(48, 64))
+    info = play(env, make_policy("oracle", env), seed=500_000)
+    env.close()
+    assert info["is_success"]
+    assert not info["collision"]
+
+
+def test_an_unknown_policy_lists_the_known_ones():
+    with pytest.raises(ValueError, match=", ".join(POLICY_NAMES)):
+        make_policy("clever", None)
+
+
+def test_random_actions_repeat_with_the_seed():
+    policy = RandomPolicy()
+    sequences = []
+    for seed in (1, 1, 2):
+        policy.reset(seed)
+        sequences.append(np.array([policy.act({}) for _ in range(30)]))
+    np.testing.assert_array_equal(sequences[0], sequences[1])
+    assert np.abs(sequences[0] - sequences[2]).max() > 0.1
