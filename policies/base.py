@@ -27,6 +27,9 @@ class Estimate:
 class Policy(Protocol):
     """Chooses actions of ``FixationPick-v0``."""
 
+    estimate: Estimate | None
+    """What the policy believed at its last action; None if it has no beliefs."""
+
     def reset(self, seed: int | None = None) -> None:
         """Forget the last episode."""
         ...

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from policies.base import Action
+from policies.base import Action, Estimate
 
 
 class RandomPolicy:
@@ -15,6 +15,7 @@ class RandomPolicy:
 
     def __init__(self, hold_steps: int = 10) -> None:
         """Hold every action for ``hold_steps`` steps."""
+        self.estimate: Estimate | None = None
         self._hold_steps = hold_steps
         self.reset()
 

@@ -51,7 +51,7 @@ def run(policy, T_base_cam, seconds, visible=lambda time: True):
 
 @pytest.fixture
 def start():
-    return look_at(np.array([0.30, -0.20, 0.30]), TARGET + [0.03, 0.02, 0.0], UP)
+    return look_at(np.array([0.30, -0.20, 0.30]), TARGET + np.array([0.03, 0.02, 0.0]), UP)
 
 
 @pytest.fixture

@@ -1,0 +1,41 @@
+"""Every example runs and does what it says."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.sim
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_quickstart_prints_the_image_size(capsys):
+    load("01_quickstart").main()
+    assert "(240, 320, 3)" in capsys.readouterr().out
+
+
+def test_servo_pick_lifts_the_object(capsys):
+    assert load("02_servo_pick").main()
+    assert "lift" in capsys.readouterr().out
+
+
+def test_recorded_frames_give_the_distance(tmp_path, capsys):
+    example = load("03_recorded_frames")
+    example.record(tmp_path / "recording.npz")
+    assert 0.3 < example.replay(tmp_path / "recording.npz") < 0.6
+    assert "+-" in capsys.readouterr().out
+
+
+def test_examples_are_short_and_each_has_a_test():
+    names = sorted(path.stem for path in EXAMPLES.glob("*.py"))
+    tests = Path(__file__).read_text()
+    for name in names:
+        assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) < 60, name
+        assert name in tests, name
