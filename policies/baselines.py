@@ -1,4 +1,4 @@
-"""Policies to compare with: random actions, and the servo without its obstacle term."""
+"""Random actions, the floor of every comparison."""
 
 from __future__ import annotations
 

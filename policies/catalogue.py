@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from fixation_gym.perception.pipeline import Perception
 from policies.base import Policy
 from policies.baselines import RandomPolicy
 from policies.servo.servo_policy import ServoPolicy
@@ -31,4 +32,5 @@ def make_policy(name: str, env: Any) -> Policy:
         return OraclePolicy(env.unwrapped)
     from fixation_gym.envs.scene import TABLE_HEIGHT
 
-    return ServoPolicy(env.unwrapped.intrinsics, TABLE_HEIGHT, avoid_obstacles=name == "servo")
+    perception = Perception(env.unwrapped.intrinsics, support_height_m=TABLE_HEIGHT)
+    return ServoPolicy(perception, avoid_obstacles=name == "servo")

@@ -100,9 +100,7 @@ class OraclePolicy:
         """In the grasp, first in line with the approach axis, then forward."""
         if self._phase == "lift":
             return self._goal
-        axis, offset = pose[:3, 2], self._goal - pose[:3, 3]
-        aside = float(np.linalg.norm(offset - axis * (axis @ offset)))
-        return self._goal - axis * min(2.0 * max(0.0, aside - 0.005), 0.06)
+        return servo_laws.funnel_waypoint(pose, self._goal, slope=2.0, length=0.06)
 
     def _fixating_twist(self, pose: FloatArray, target: FloatArray) -> FloatArray:
         assert self._direction is not None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-SIMULATOR_FILES = {"fixation_gym/envs/robosuite_backend.py", "fixation_gym/envs/rendering.py"}
+MUJOCO_FILES = {f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "contacts", "rendering")}
 FORBIDDEN = {
     "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
     "fixation_gym/control": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
@@ -45,10 +45,12 @@ def test_packages_import_only_what_they_may(package):
             assert not broken, f"{path.relative_to(ROOT)} imports {module}"
 
 
-def test_only_the_backend_and_the_renderer_import_robosuite():
-    for path in (ROOT / "fixation_gym").rglob("*.py"):
-        if str(path.relative_to(ROOT)) not in SIMULATOR_FILES:
-            assert not any(module.split(".")[0] == "robosuite" for module in imported_modules(path)), path
+def test_only_few_files_know_the_simulators():
+    for path in [*(ROOT / "fixation_gym").rglob("*.py"), *(ROOT / "policies").rglob("*.py")]:
+        name = str(path.relative_to(ROOT))
+        packages = {module.split(".")[0] for module in imported_modules(path)}
+        assert "robosuite" not in packages or name == "fixation_gym/envs/robosuite_backend.py", name
+        assert "mujoco" not in packages or name in MUJOCO_FILES | {"fixation_gym/doctor.py"}, name
 
 
 @pytest.mark.parametrize(

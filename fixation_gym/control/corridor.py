@@ -49,8 +49,8 @@ class Box:
     half_extent: FloatArray
     yaw: float
 
-    def surface_points(self, spacing: float = 0.03) -> FloatArray:
-        """Points on the box surface and inside, shape (n, 3), m; ``spacing`` is well below the width of a finger."""
+    def surface_points(self, spacing: float = 0.02) -> FloatArray:
+        """Points in the box, shape (n, 3), m; ``spacing`` is below the thickness of the fingers."""
         axes = [np.linspace(-h, h, max(2, int(np.ceil(2.0 * h / spacing)) + 1)) for h in self.half_extent]
         local = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
         c, s = np.cos(self.yaw), np.sin(self.yaw)
@@ -86,8 +86,9 @@ def free_directions(target: FloatArray, obstacles: list[Box], directions: FloatA
     right /= np.linalg.norm(right, axis=-1, keepdims=True)
     down = np.cross(forward, right)
     axes = np.stack([right, down, forward], axis=1)
-    hit = in_corridor(np.einsum("dij,pj->dpi", axes, points), margin)
-    return np.asarray(~np.any(hit, axis=-1))
+    local = (points @ axes.reshape(-1, 3).T).reshape(len(points), len(directions), 3)
+    hit = in_corridor(local, margin)
+    return np.asarray(~np.any(hit, axis=0))
 
 
 def in_corridor(points: FloatArray, margin: float) -> MaskArray:
@@ -101,7 +102,10 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
         Mask of shape (...).
     """
     hit: MaskArray = np.zeros(points.shape[:-1], dtype=np.bool_)
-    for low, high in _BOXES:
-        inside = np.all((points > low - margin) & (points < high + margin), axis=-1)
+    x, y, z = (np.ascontiguousarray(points[..., i]) for i in range(3))
+    for low, high in zip(_BOXES[:, 0] - margin, _BOXES[:, 1] + margin, strict=True):
+        inside = (x > low[0]) & (x < high[0])
+        inside &= (y > low[1]) & (y < high[1])
+        inside &= (z > low[2]) & (z < high[2])
         np.logical_or(hit, inside, out=hit)
     return hit

@@ -12,6 +12,9 @@ import numpy as np
 from fixation_gym.geometry.interaction import rotation_part, translation_part
 from fixation_gym.types import FloatArray
 
+_IN_LINE = 0.005
+"""Offset from the axis that counts as none, m."""
+
 
 def gaze_rotation(
     centroid: FloatArray, gain: float, inverse_distance: float, v: FloatArray, roll_rate: float
@@ -70,6 +73,20 @@ def lateral_velocity(
     phase = cycle_rate * time
     cycle = cycle_amplitude * cycle_rate * np.array([math.sin(phase), math.cos(phase)])
     return np.asarray(distance_gain) * (distance - desired_distance) + cycle - obstacle_gain * np.asarray(obstacle)
+
+
+def funnel_waypoint(T_base_cam: FloatArray, goal: FloatArray, slope: float, length: float) -> FloatArray:
+    """Camera position to head for so that the tool comes to its goal along the optical axis, shape (3,), in base, m.
+
+    Args:
+        T_base_cam: camera pose, shape (4, 4).
+        goal: final camera position in base, shape (3,).
+        slope: how far to stay back per metre off the axis.
+        length: largest distance to stay back, m.
+    """
+    axis, offset = T_base_cam[:3, 2], goal - T_base_cam[:3, 3]
+    aside = float(np.linalg.norm(offset - axis * (axis @ offset)))
+    return goal - axis * min(slope * max(0.0, aside - _IN_LINE), length)
 
 
 def roll_rate(roll_error: float, gain: float) -> float:

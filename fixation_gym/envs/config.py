@@ -40,23 +40,35 @@ class Scenario:
     def __post_init__(self) -> None:
         _require_names("obstacle_kinds", self.obstacle_kinds, OBSTACLE_KINDS)
         _require_names("target_shapes", self.target_shapes, tuple(shape.name for shape in TARGET_SHAPES))
-        low, high = self.obstacle_count
-        if not 0 <= low <= high <= MAX_OBSTACLES:
-            raise ValueError(f"obstacle_count must be (low, high) within 0..{MAX_OBSTACLES}, got {self.obstacle_count}")
+        _require_range("obstacle_count", self.obstacle_count, 0, MAX_OBSTACLES)
+        _require_range("grasp_width", self.grasp_width, 0.025, 0.07)
+        _require_range("alpha", self.alpha, 0.0, 1.0)
+        high = self.obstacle_count[1]
+        if not all(isinstance(count, int) for count in self.obstacle_count):
+            raise ValueError(f"obstacle_count must be two whole numbers, got {self.obstacle_count}")
+        if high > 1 and set(self.obstacle_kinds) == {"mirror"}:
+            raise ValueError(f"obstacle_count may be at most 1 with mirrors alone, got {self.obstacle_count}")
         if high > 0 and not self.obstacle_kinds:
             raise ValueError(f"obstacle_count {self.obstacle_count} needs obstacle_kinds from {OBSTACLE_KINDS}")
         if not self.target_shapes:
             raise ValueError("target_shapes must name at least one shape")
-        if not 0.025 <= self.grasp_width[0] <= self.grasp_width[1] <= 0.07:
-            raise ValueError(f"grasp_width must be (low, high) within 0.025..0.07 m, got {self.grasp_width}")
-        if not 0.0 < self.alpha[0] <= self.alpha[1] <= 1.0:
-            raise ValueError(f"alpha must be (low, high) within (0, 1], got {self.alpha}")
 
 
 def _require_names(field: str, names: tuple[str, ...], allowed: tuple[str, ...]) -> None:
-    unknown = sorted(set(names) - set(allowed))
+    if not isinstance(names, (tuple, list)):
+        raise ValueError(f"{field} must be a list of names from {list(allowed)}, got {names!r}")
+    unknown = [name for name in names if name not in allowed]
     if unknown:
         raise ValueError(f"unknown {field} {unknown}; choose from {list(allowed)}")
+
+
+def _require_range(field: str, values: tuple[float, float], lowest: float, highest: float) -> None:
+    """Check a pair (low, high) of numbers."""
+    pair = isinstance(values, (tuple, list)) and len(values) == 2
+    if not pair or not all(isinstance(value, (int, float)) for value in values):
+        raise ValueError(f"{field} must be two numbers (low, high), got {values!r}")
+    if not lowest <= values[0] <= values[1] <= highest:
+        raise ValueError(f"{field} must be (low, high) within {lowest}..{highest}, got {values}")
 
 
 SCENARIOS: dict[str, Scenario] = {
@@ -151,6 +163,6 @@ def resolve_sensor_noise(name: str) -> SensorNoise:
     Raises:
         ValueError: for an unknown name; the message lists the valid ones.
     """
-    if name not in SENSOR_NOISE:
+    if not isinstance(name, str) or name not in SENSOR_NOISE:
         raise ValueError(f"unknown sensor_noise {name!r}; choose one of {', '.join(SENSOR_NOISE)}")
     return SENSOR_NOISE[name]

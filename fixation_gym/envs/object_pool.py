@@ -2,7 +2,7 @@
 
 Every shape lives in the compiled model from the start; a scene shows, scales and recolours the ones it needs. Lengths
 are half sizes in m at scale 1, which is the largest scale a scene may use. A shape's origin is the centre of its
-bounding box; +z is up, and obstacles turn their +x face towards the robot at yaw 0.
+bounding box; +z is up, and a panel or mirror faces +x.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from fixation_gym.envs import config, rewards, sensors
+from fixation_gym.envs.arguments import checked_image_size, observation_space, require_choice
 from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, sample_scene
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
@@ -19,8 +20,8 @@ from fixation_gym.robot import CAMERA_FOVY, HAND_EYE, TWIST_LIMITS
 from fixation_gym.types import FloatArray, ImageArray, Observation
 
 if TYPE_CHECKING:
-    from fixation_gym.envs.rendering import View
-    from fixation_gym.envs.robosuite_backend import PickSim
+    from fixation_gym.envs.pick_sim import PickSim
+    from fixation_gym.envs.rendering import View, Window
 
 RENDER_VIEWS = ("wrist", "front", "overlay")
 _FRONT_SIZE = (360, 480)
@@ -37,7 +38,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     | 3-5 | camera rotation rate w_X, w_Y, w_Z in the camera frame | 0.8 rad/s |
     | 6 | gripper: below 0 opens, above 0 closes, 0 holds | - |
 
-    **Observation** ``Dict``, all of one instant; vectors are float32.
+    **Observation** ``Dict`` with one time stamp; vectors are float32. A noise preset may make the image a few ms older.
 
     | key | shape | meaning |
     |---|---|---|
@@ -53,10 +54,11 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
 
     **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.50 m away,
     looking within 9 cm of it. **End** ``terminated`` on success: target 0.1 m above its resting height for 0.5 s.
-    Time-outs are ``truncated`` by the spec's ``max_episode_steps`` (25 s).
+    Time-outs are ``truncated`` by the spec's ``max_episode_steps``: 625, which is 25 s at 25 Hz.
 
     **Info** the same keys in ``reset`` and ``step``: ``is_success``, ``success``, ``collision`` (robot-obstacle contact
-    above 1 N, or an obstacle pushed by more than 1 cm, so far in the episode), ``clearance_m``, ``distance_true_m``
+    above 1 N, or an obstacle pushed by more than 1 cm, so far in the episode), ``clearance_m`` (between robot and
+    obstacles, at most 0.5), ``distance_true_m``
     (depth of the target's centre along the optical axis), ``fixation_error_px`` (of that centre from the image
     centre; NaN behind the camera), ``reward_terms``. True values never reach the observation.
     """
@@ -79,9 +81,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             scenario: name from ``config.SCENARIO_NAMES`` or a mapping of ``config.Scenario`` fields.
             image_size: (height, width) of the wrist image, px.
             sensor_noise: "ideal", "nominal" or "conservative".
-            control_frequency: steps per second; divides 500, the physics rate.
-            render_mode: None, "rgb_array" or "human".
-            render_view: "wrist", "front" or "overlay" (both, annotated with what perception makes of the images).
+            control_frequency: steps per second: 10, 20, 25, 50 or 100.
+            render_mode: None, "rgb_array" or "human" (MuJoCo's viewer; needs a display).
+            render_view: of "rgb_array": "wrist", "front" or "overlay" (both, annotated with what perception sees).
             reward: "dense" or "sparse".
 
         Raises:
@@ -89,12 +91,12 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         """
         self.scenario = config.resolve_scenario(scenario)
         self.noise = config.resolve_sensor_noise(sensor_noise)
-        height, width = _checked_image_size(image_size)
+        height, width = checked_image_size(image_size)
         if control_frequency not in (10, 20, 25, 50, 100):
             raise ValueError(f"control_frequency must be 10, 20, 25, 50 or 100 Hz, got {control_frequency!r}")
-        _require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
-        _require_choice("render_view", render_view, RENDER_VIEWS)
-        _require_choice("reward", reward, rewards.REWARDS)
+        require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
+        require_choice("render_view", render_view, RENDER_VIEWS)
+        require_choice("reward", reward, rewards.REWARDS)
         self.render_mode, self.render_view = render_mode, render_view
         self.metadata = self.metadata | {"render_fps": control_frequency}
         self.intrinsics = Intrinsics.from_fovy(height, width, CAMERA_FOVY)
@@ -102,10 +104,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self.control_frequency = control_frequency
         self._reward_terms = rewards.dense_terms if reward == "dense" else rewards.sparse_terms
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
-        self.observation_space = _observation_space(height, width)
+        self.observation_space = observation_space(height, width)
         self._sim: PickSim | None = None
         self._views: dict[str, View] = {}
-        self._viewer: Any = None
+        self._window: Window | None = None
         self._perception = Perception(self.intrinsics, support_height_m=TABLE_HEIGHT)
         self._percept: Percept | None = None
         self.scene: SceneSpec | None = None
@@ -126,6 +128,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._perception.reset()
         self._state = self._task_state()
         observation = self._observe(self.sim.data.qpos)
+        if self.render_mode == "human":
+            self.render()
         terms = dict.fromkeys(self._reward_terms(self._state, self._state), 0.0)
         return observation, self._info(terms)
 
@@ -158,7 +162,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             gym.logger.warn('render() needs render_mode="rgb_array" or "human" in gym.make')
             return None
         if self.render_mode == "human":
-            self._sync_viewer()
+            self._show()
             return None
         qpos = self.sim.data.qpos
         if self.render_view == "wrist":
@@ -175,9 +179,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         for view in self._views.values():
             view.close()
         self._views = {}
-        if self._viewer is not None:
-            self._viewer.close()
-            self._viewer = None
+        if self._window is not None:
+            self._window.close()
+            self._window = None
 
     # -- for checkers, privileged policies and experiments -------------------------------------------------------
 
@@ -188,7 +192,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             from fixation_gym.gl import select_backend
 
             select_backend()
-            from fixation_gym.envs.robosuite_backend import PickSim
+            from fixation_gym.envs.pick_sim import PickSim
 
             self._sim = PickSim(self.control_frequency)
         return self._sim
@@ -218,7 +222,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             "joint_vel": joint_vel,
             "gripper_width": [state.gripper_width],
             "camera_pose": matrix_to_pose(pose),
-            "camera_twist": state.jacobian @ joint_vel,
+            "camera_twist": sensors.measure_camera_twist(state.jacobian, joint_vel, self._errors.hand_eye),
             "time": [self._steps / self.control_frequency],
         }
         observation: dict[str, Any] = {"rgb": self._last_rgb.copy()}
@@ -240,12 +244,13 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
         return self._views[view].render(qpos, with_reflections=mirror)
 
-    def _sync_viewer(self) -> None:
-        if self._viewer is None:
-            import mujoco.viewer
+    def _show(self) -> None:
+        """Update the window, opening it at first use."""
+        if self._window is None:
+            from fixation_gym.envs.rendering import Window
 
-            self._viewer = mujoco.viewer.launch_passive(self.sim.model, self.sim.data)
-        self._viewer.sync()
+            self._window = Window(self.sim.model, self.sim.data)
+        self._window.sync()
 
     def _task_state(self) -> rewards.TaskState:
         sim = self.sim
@@ -266,34 +271,3 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             "fixation_error_px": float(np.linalg.norm(self.intrinsics.project(target) - centre)),
             "reward_terms": terms,
         }
-
-
-def _checked_image_size(image_size: Any) -> tuple[int, int]:
-    sizes = tuple(image_size) if isinstance(image_size, (tuple, list)) else ()
-    whole = all(isinstance(size, (int, np.integer)) and not isinstance(size, bool) for size in sizes)
-    if len(sizes) != 2 or not whole or not all(32 <= size <= 2048 for size in sizes):
-        raise ValueError(f"image_size must be (height, width), two whole numbers within 32..2048, got {image_size!r}")
-    return int(sizes[0]), int(sizes[1])
-
-
-def _require_choice(name: str, value: str | None, allowed: tuple[str | None, ...]) -> None:
-    if value not in allowed:
-        raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
-
-
-def _observation_space(height: int, width: int) -> spaces.Dict:
-    def box(*bounds: float) -> spaces.Box:
-        high = np.array(bounds, dtype=np.float32)
-        return spaces.Box(-high, high, dtype=np.float32)
-
-    return spaces.Dict(
-        {
-            "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
-            "joint_pos": box(*[4.0] * 7),
-            "joint_vel": box(*[10.0] * 7),
-            "gripper_width": spaces.Box(0.0, 0.1, (1,), np.float32),
-            "camera_pose": box(*[2.0] * 3, *[1.0] * 4),
-            "camera_twist": box(*[5.0] * 3, *[20.0] * 3),
-            "time": spaces.Box(0.0, 3600.0, (1,), np.float32),
-        }
-    )

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import atexit
+import os
+import sys
 from typing import Any
 
 import mujoco
@@ -63,3 +65,29 @@ class View:
         """Free the GL context; may be called twice."""
         atexit.unregister(self.close)
         self._renderer.close()
+
+
+class Window:
+    """MuJoCo's interactive viewer on a running simulation."""
+
+    def __init__(self, model: Any, data: Any) -> None:
+        """Open the window.
+
+        Raises:
+            RuntimeError: without a display.
+        """
+        if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise RuntimeError('render_mode="human" needs a display; without one use render_mode="rgb_array"')
+        import mujoco.viewer
+
+        self._viewer = mujoco.viewer.launch_passive(model, data)
+        self._viewer.opt.geomgroup[:] = 0
+        self._viewer.opt.geomgroup[[scene_mjcf.VISIBLE_GROUP, scene_mjcf.ROBOT_GROUP]] = 1
+
+    def sync(self) -> None:
+        """Show the present state."""
+        self._viewer.sync()
+
+    def close(self) -> None:
+        """Close the window; may be called twice."""
+        self._viewer.close()

@@ -1,6 +1,6 @@
 """Writes a ``SceneSpec`` into the compiled model: shows, scales, weighs and colours the pool parts it needs.
 
-Every reset writes every pool field, so a scene leaves nothing behind for the next one.
+Every load starts from the fields as they were compiled, so a scene leaves nothing behind for the next one.
 """
 
 from __future__ import annotations
@@ -19,6 +19,13 @@ from fixation_gym.types import FloatArray
 TARGET_RGBA = (0.80, 0.06, 0.05, 1.0)
 _LABEL_RGBA = (0.85, 0.85, 0.25, 1.0)
 _RIM_RGBA = (0.16, 0.17, 0.20, 1.0)
+
+
+_WRITTEN_FIELDS = (
+    *("geom_size", "geom_pos", "geom_rbound", "geom_aabb", "geom_group", "geom_contype", "geom_conaffinity"),
+    *("geom_matid", "geom_rgba", "body_mass", "body_inertia", "body_ipos", "body_iquat", "body_gravcomp", "light_dir"),
+)
+"""Fields of the model that a scene changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +58,15 @@ class SceneLoader:
         self._materials = {model.mat(i).name: i for i in range(model.nmat)}
         self._mirror_slot = next(body for body, shape in self._parts if shape == "mirror")
         self._table_geom = model.geom("table_visual").id
+        pool = [entry.geom for parts in self._parts.values() for entry in parts]
+        model.geom_contype[pool] = model.geom_conaffinity[pool] = 0
+        self._untouched = {name: getattr(model, name).copy() for name in _WRITTEN_FIELDS}
 
     def load(self, scene: SceneSpec) -> dict[str, tuple[Vector, float]]:
         """Write the scene's shapes; returns centre (in the robot base frame, m) and yaw of every body in use."""
         model = self._model
-        for (body, _), parts in self._parts.items():
-            for entry in parts:
-                model.geom_group[entry.geom] = HIDDEN_GROUP
-                model.geom_contype[entry.geom] = model.geom_conaffinity[entry.geom] = 0
-            model.body_gravcomp[self._bodies[body]] = 1.0
+        for name, values in self._untouched.items():
+            getattr(model, name)[:] = values
         model.geom_matid[self._table_geom] = self._materials[scene.table_texture]
         light = np.array(scene.light_direction)
         model.light_dir[:] = light / np.linalg.norm(light)
@@ -118,6 +125,7 @@ class SceneLoader:
             model.geom_rgba[entry.geom] = colours[finish]
             if finish == "label" and not obstacle.has_label:
                 model.geom_group[entry.geom] = HIDDEN_GROUP
+                model.geom_contype[entry.geom] = model.geom_conaffinity[entry.geom] = 0
 
 
 def _size_factors(part: Part, factors: FloatArray) -> FloatArray:

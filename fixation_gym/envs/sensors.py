@@ -8,6 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fixation_gym.envs.config import SensorNoise
+from fixation_gym.geometry.rigid import inverse
+from fixation_gym.geometry.twist import adjoint
 from fixation_gym.types import FloatArray, ImageArray
 
 
@@ -46,10 +48,18 @@ def measure_camera_pose(
     The joint errors are below 1e-3 rad, so their effect is taken to first order through the Jacobian, (6, 7) in cam.
     """
     motion = jacobian @ joint_error + hand_eye
-    pose = T_base_cam.copy()
+    pose = np.array(T_base_cam)
     pose[:3, 3] += T_base_cam[:3, :3] @ motion[:3]
     pose[:3, :3] = T_base_cam[:3, :3] @ Rotation.from_rotvec(motion[3:]).as_matrix()
     return pose
+
+
+def measure_camera_twist(jacobian: FloatArray, joint_vel: FloatArray, hand_eye: FloatArray) -> FloatArray:
+    """Twist [v, w], shape (6,), that kinematics gives in the camera frame as the hand-eye calibration believes it."""
+    T_true_believed = np.eye(4)
+    T_true_believed[:3, :3] = Rotation.from_rotvec(hand_eye[3:]).as_matrix()
+    T_true_believed[:3, 3] = hand_eye[:3]
+    return adjoint(inverse(T_true_believed)) @ (jacobian @ joint_vel)
 
 
 def measure_image(image: ImageArray, noise: SensorNoise, exposure: float, rng: np.random.Generator) -> ImageArray:

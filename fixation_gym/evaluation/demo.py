@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from contextlib import closing
 from pathlib import Path
@@ -21,6 +22,8 @@ from fixation_gym.evaluation.storage import (
     SUMMARY_FILE,
     EpisodeKey,
     EpisodeStore,
+    check_no_folders,
+    folder_lock,
     make_folder,
     write_json,
 )
@@ -30,11 +33,13 @@ from policies.base import Policy
 
 VIDEO_FILE = "demo.mp4"
 SHEET_FILE = "contact_sheet.png"
+_FILES = (RUN_FILE, EPISODES_FILE, VIDEO_FILE, SHEET_FILE, SUMMARY_FILE)
 SHEET_COLUMNS = 5
 SHEET_CELL_WIDTH = 480
 FRAME_STRIDE = 3
 """Every third control step is filmed: two annotated views in full quality take most of the time."""
 FRAMES_PER_SECOND = 25 / FRAME_STRIDE
+_PART = ".demo.part"  # folder of a demonstration that is not complete yet
 _SHEET_STRIDE = 2  # every second frame is kept for the sheet: enough to choose from, little memory
 _OUTCOME_FRAMES = 10  # the last frame stands this long, with the outcome
 
@@ -42,7 +47,8 @@ _OUTCOME_FRAMES = 10  # the last frame stands this long, with the outcome
 def run_demo(config: EvaluationConfig, out: Path) -> dict[str, Any]:
     """Film every episode, and write video, contact sheet, episodes and summary.
 
-    A demonstration does not resume: what an earlier one left in the folder is replaced.
+    A demonstration does not resume. It replaces an earlier one in the folder once it is complete; one that fails
+    leaves the folder as it was.
 
     Args:
         config: must have passed ``check``; workers and backend are ignored.
@@ -55,9 +61,23 @@ def run_demo(config: EvaluationConfig, out: Path) -> dict[str, Any]:
         UsageError: if the folder cannot be used.
     """
     started = time.monotonic()
-    run = {"command": "demo", **config.run_description()}
     make_folder(out)
-    _remove_earlier_demo(out)
+    with folder_lock(out):
+        _check_replaceable(out)
+        part = out / _PART
+        shutil.rmtree(part, ignore_errors=True)  # of a demonstration that was killed
+        try:
+            summary = _film_all(config, part, started)
+            for name in _FILES:
+                (part / name).replace(out / name)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    return summary
+
+
+def _film_all(config: EvaluationConfig, out: Path, started: float) -> dict[str, Any]:
+    """Write all files of a demonstration to a folder of its own; returns the summary."""
+    run = {"command": "demo", **config.run_description()}
     sheet: list[ImageArray] = []
     progress = tqdm(total=len(config.episode_keys()), unit="episode", dynamic_ncols=True)
     with EpisodeStore(out, run) as store, closing(progress):
@@ -112,12 +132,13 @@ def _outcome(result: EpisodeResult) -> str:
     return f"{outcome}, collision" if result.collision else outcome
 
 
-def _remove_earlier_demo(out: Path) -> None:
-    """Remove the files of an earlier demonstration, and nothing else.
+def _check_replaceable(out: Path) -> None:
+    """Check that a folder has no results, or those of a demonstration.
 
     Raises:
-        UsageError: if another command's results are there.
+        UsageError: if another command's results are there, or a folder has the name of a result.
     """
+    check_no_folders(out, _FILES)
     stored = [name for name in (RUN_FILE, EPISODES_FILE, SUMMARY_FILE) if (out / name).exists()]
     try:
         is_demo = json.loads((out / RUN_FILE).read_text(encoding="utf-8"))["command"] == "demo"
@@ -125,5 +146,3 @@ def _remove_earlier_demo(out: Path) -> None:
         is_demo = False
     if stored and not is_demo:
         raise UsageError(f"{out} holds results of another command ({stored[0]}); choose another --out")
-    for name in (SUMMARY_FILE, VIDEO_FILE, SHEET_FILE, EPISODES_FILE, RUN_FILE):
-        (out / name).unlink(missing_ok=True)

@@ -8,6 +8,9 @@ from typing import Any
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.statistics import mean, median, minimum, wilson_interval
 
+CLEARANCE_LIMIT_M = 0.5
+"""The environment measures clearances up to here only, and reports this value without obstacles, too."""
+
 HEADER = ("scenario", "success [95 % CI]", "collision-free [95 % CI]", "time s", "distance error at grasp mm")
 
 
@@ -15,7 +18,8 @@ def summarise(results: Sequence[EpisodeResult]) -> dict[str, dict[str, Any]]:
     """Summarise per scenario, in the order in which scenarios first occur.
 
     ``mean_time_s`` is over all episodes (time-outs count in full), ``mean_success_time_s`` over the successful ones.
-    A value is None where no episode has it.
+    A value is None where no episode has it; ``min_clearance_m`` also where it reaches ``CLEARANCE_LIMIT_M``, because
+    the environment then measured no obstacle: it is further away, or there is none.
     """
     scenarios = dict.fromkeys(result.scenario for result in results)
     return {name: _summarise([result for result in results if result.scenario == name]) for name in scenarios}
@@ -23,6 +27,9 @@ def summarise(results: Sequence[EpisodeResult]) -> dict[str, dict[str, Any]]:
 
 def _summarise(results: Sequence[EpisodeResult]) -> dict[str, Any]:
     n = len(results)
+    clearance = minimum(result.min_clearance_m for result in results)
+    if clearance is not None and clearance >= CLEARANCE_LIMIT_M:  # saturated: no measurement
+        clearance = None
     successes = sum(result.success for result in results)
     collision_free = sum(result.collision_free_success for result in results)
     return {
@@ -37,7 +44,7 @@ def _summarise(results: Sequence[EpisodeResult]) -> dict[str, Any]:
         "collisions": sum(result.collision for result in results),
         "mean_success_time_s": mean(result.time_s for result in results if result.success),
         "distance_error_at_grasp_median_m": median(result.distance_error_at_grasp_m for result in results),
-        "min_clearance_m": minimum(result.min_clearance_m for result in results),
+        "min_clearance_m": clearance,
         "mean_return": mean(result.return_ for result in results),
     }
 

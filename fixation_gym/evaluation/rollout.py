@@ -47,7 +47,7 @@ class EpisodeResult:
     fixation_rms_px: float | None
     """Root mean square of the target's offset from the image centre while the gaze is held, px."""
     min_clearance_m: float | None
-    """Smallest distance between robot and obstacles, m."""
+    """Smallest distance between robot and obstacles, m; 0.5 also where they are further apart or there is none."""
 
     def to_json(self) -> dict[str, Any]:
         """A dict of JSON values."""

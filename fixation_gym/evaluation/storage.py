@@ -10,7 +10,7 @@ import fcntl
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -39,6 +39,40 @@ def make_folder(folder: Path) -> None:
     except OSError as error:
         reason = error.strerror or str(error)
         raise UsageError(f"cannot write to the output folder {folder}: {reason}; choose another --out") from error
+
+
+@contextlib.contextmanager
+def folder_lock(folder: Path) -> Iterator[None]:
+    """Keep every other run out of a folder. The lock is on the folder itself, so that it leaves no file behind.
+
+    Raises:
+        UsageError: if another run has the lock, or the folder cannot be opened.
+    """
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise UsageError(f"cannot open the output folder {folder}: {error.strerror}; choose another --out") from error
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise UsageError(f"{folder} is in use by another run; choose another --out") from error
+        except OSError:  # network file systems may not lock folders; there the user has to take care
+            pass
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def check_no_folders(folder: Path, names: Iterable[str]) -> None:
+    """Check that files with these names can be put into a folder, replacing files only.
+
+    Raises:
+        UsageError: naming the first that is a folder.
+    """
+    for name in names:
+        if (folder / name).is_dir():
+            raise UsageError(f"{folder / name} is a folder where a file is needed; choose another --out")
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -75,16 +109,18 @@ class EpisodeStore:
         """
         make_folder(folder)
         self.folder = folder
-        _check_run(folder, run)
-        self._file = (folder / EPISODES_FILE).open("a+b")
-        try:
-            self._lock()
-            self.finished = self._read()
-        except BaseException:
-            self._file.close()
-            raise
-        if not (folder / RUN_FILE).exists():
-            write_json(folder / RUN_FILE, dict(run))
+        with contextlib.ExitStack() as opened:
+            opened.enter_context(folder_lock(folder))
+            check_no_folders(folder, (RUN_FILE, EPISODES_FILE, SUMMARY_FILE))
+            try:
+                _check_run(folder, run)
+                self._file = opened.enter_context((folder / EPISODES_FILE).open("a+b"))
+                self.finished = self._read()
+                if not (folder / RUN_FILE).exists():
+                    write_json(folder / RUN_FILE, dict(run))
+            except OSError as error:
+                raise UsageError(f"cannot use the results in {folder} ({error}); choose another --out") from error
+            self._opened = opened.pop_all()
 
     def __enter__(self) -> EpisodeStore:
         return self
@@ -92,7 +128,7 @@ class EpisodeStore:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._file.close()
+        self._opened.close()
 
     def append(self, result: EpisodeResult) -> None:
         """Store a finished episode; it is on the disk when this returns."""
@@ -100,14 +136,6 @@ class EpisodeStore:
         self._file.flush()
         os.fsync(self._file.fileno())
         self.finished[(result.scenario, result.seed)] = result
-
-    def _lock(self) -> None:
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise UsageError(f"{self.folder} is in use by another run; choose another --out") from error
-        except OSError:  # some network file systems have no locks; there the user has to take care
-            pass
 
     def _read(self) -> dict[EpisodeKey, EpisodeResult]:
         """Read all episodes, and cut off a last line that a kill tore."""

@@ -38,6 +38,8 @@ class MemorySettings:
     """Factor on the evidence of a point where the camera now sees something behind it."""
     saturation: float = 8.0
     """Largest evidence of a point, in frames."""
+    forget_below: float = 0.2
+    """Points with less evidence are dropped, in frames."""
     min_evidence: float = 5.0
     """Points with less are not believed yet, in frames."""
 
@@ -86,7 +88,7 @@ def remember(
     evidence = np.zeros(len(keys))
     np.add.at(evidence, index.ravel(), np.concatenate([faded, np.ones(len(new_keys))]))
     evidence = np.minimum(evidence, settings.saturation)
-    keep = evidence > 0.2
+    keep = evidence > settings.forget_below
     return ObstacleMemory(keys[keep], evidence[keep], time)
 
 

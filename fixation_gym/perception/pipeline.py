@@ -39,8 +39,8 @@ class PerceptionSettings:
     """Prior, noise and gates of the distance filter."""
     zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
     """Margins and gates of the zero-flow test."""
-    max_gap_s: float = 0.1
-    """Frames farther apart than this are not differentiated, s; 2.5 periods at 25 Hz."""
+    max_gap_s: float = 0.15
+    """Frames farther apart than this are not differentiated, s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +57,8 @@ class Percept:
     """Zero-flow test at the previous frame: what is nearer than the fixated object."""
     fixation: Fixation
     """Where the fixated object is now."""
+    T_base_cam: FloatArray
+    """Camera pose in base at the time of ``flow`` and ``zfc``, shape (4, 4)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +96,7 @@ class Perception:
         self._intrinsics = intrinsics
         self._settings = settings or PerceptionSettings()
         self._self_mask = None if self_mask is None else np.array(self_mask, dtype=np.bool_)
-        self._support_height_m = support_height_m
+        self.support_height_m = support_height_m
         halvings = 0
         while intrinsics.width > self._settings.flow.max_width * 2**halvings:
             halvings += 1
@@ -125,12 +127,17 @@ class Perception:
             self._frames.clear()
         self._frames.append(_Frame(observation.time, self._grey(observation.rgb), T_base_cam, segmentation))
         flow, zero_flow = self._look_for_obstacles()
-        return Percept(observation.time, segmentation, flow, zero_flow, fixation)
+        middle = self._frames[max(0, len(self._frames) - 2)]
+        return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam)
 
     def _check(self, observation: Observation) -> None:
         expected = (self._intrinsics.height, self._intrinsics.width, 3)
-        if observation.rgb.shape != expected:
-            raise ValueError(f"rgb has shape {observation.rgb.shape}, but the intrinsics ask for {expected}")
+        if observation.rgb.shape != expected or observation.rgb.dtype != np.uint8:
+            found = f"{observation.rgb.dtype} of shape {observation.rgb.shape}"
+            raise ValueError(f"rgb is {found}, but the intrinsics ask for uint8 of shape {expected}")
+        pose = np.asarray(observation.camera_pose)
+        if pose.shape != (7,) or not np.all(np.isfinite(pose)) or not np.any(pose[3:]):
+            raise ValueError(f"camera_pose must be a finite position and quaternion (w, x, y, z), got {pose}")
         if self._frames and not observation.time > self._frames[-1].time:
             last = self._frames[-1].time
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
@@ -196,4 +203,4 @@ class Perception:
             return flow, unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
         gaze = Gaze(twist, inverse_distance, inverse_std, middle.segmentation.mask, middle.T_base_cam)
-        return flow, zero_flow_test(flow, gaze, settings.zero_flow, self._self_mask, self._support_height_m)
+        return flow, zero_flow_test(flow, gaze, settings.zero_flow, self._self_mask, self.support_height_m)

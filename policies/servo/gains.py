@@ -60,6 +60,10 @@ class ServoGains:
     """Rate at which the tool nears its goal in open-loop motions, 1/s."""
     tool_speed: float = 0.10
     """Largest speed of open-loop motions, m/s."""
+    funnel_slope: float = 2.0
+    """In the grasp, how far the tool stays back per metre that it is off the approach axis."""
+    funnel_length: float = 0.06
+    """Largest distance that it stays back, m."""
     tool_tolerance: float = 0.004
     """Distance at which the tool has arrived, m."""
     finger_room: float = 0.016
@@ -78,3 +82,7 @@ class ServoGains:
     """How far to back off before looking again, m."""
     search_rate: float = 0.35
     """Turning rate of the search, rad/s."""
+    search_widening: float = 3.2
+    """The search turns by this angle times the square root of its seconds, so its circles widen, rad."""
+    level_fade: float = 6.0
+    """The hand is levelled fully while the gaze is off the vertical by more than 1 / ``level_fade`` rad."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from fixation_gym.control import servo_laws
 from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
-from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
 from fixation_gym.perception.grasp_axis import narrow_axis
 from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
@@ -32,26 +31,25 @@ class ServoPolicy:
 
     def __init__(
         self,
-        intrinsics: Intrinsics,
-        support_height_m: float | None,
+        perception: Perception,
         gains: ServoGains | None = None,
+        memory: MemorySettings | None = None,
         avoid_obstacles: bool = True,
     ) -> None:
         """Prepare for a robot.
 
         Args:
-            intrinsics: of the wrist camera.
-            support_height_m: height of the table in base, m; None if unknown.
+            perception: made for its wrist camera; the policy resets and updates it.
             gains: numbers of the behaviour; None for the defaults.
+            memory: how obstacles are remembered; None for the defaults.
             avoid_obstacles: False leaves out the obstacle term (the "blind" baseline).
         """
         self.gains = gains or ServoGains()
         self.percept: Percept | None = None
         self.estimate: Estimate | None = None
         self._avoid_obstacles = avoid_obstacles
-        self._support_height_m = support_height_m
-        self._perception = Perception(intrinsics, support_height_m=support_height_m)
-        self._memory_settings = MemorySettings()
+        self._perception = perception
+        self._memory_settings = memory or MemorySettings()
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
@@ -62,7 +60,6 @@ class ServoPolicy:
         self._phase_start = 0.0
         self._last_seen = -math.inf
         self._goal: FloatArray | None = None
-        self._middle_pose: FloatArray | None = None
         self.percept = self.estimate = None
 
     def act(self, obs: Mapping[str, Any]) -> Action:
@@ -74,9 +71,9 @@ class ServoPolicy:
         return action.astype(np.float32)
 
     def command(self, percept: Percept, observation: Observation) -> Command:
-        """Command for the next control period, for use with a perception and a robot of one's own."""
+        """Command for the next control period, for a robot loop that updates its own perception."""
         T_base_cam = pose_to_matrix(observation.camera_pose)
-        self._remember_obstacles(percept, T_base_cam)
+        self._remember_obstacles(percept)
         obstacle = self._obstacle_term(percept, T_base_cam)
         self._advance(percept, observation, T_base_cam, obstacle)
         fixation = percept.fixation
@@ -88,21 +85,20 @@ class ServoPolicy:
 
     # -- obstacles -----------------------------------------------------------------------------------------------
 
-    def _remember_obstacles(self, percept: Percept, T_base_cam: FloatArray) -> None:
-        """Add the zero-flow test, which belongs to the previous frame, to the memory."""
+    def _remember_obstacles(self, percept: Percept) -> None:
+        """Add the zero-flow test to the memory."""
         # While the gaze still swings to the target, small errors of the time stamps look like motion.
         centred = float(np.linalg.norm(percept.fixation.centroid)) < self.gains.grasp_centred
         looking = centred and self._phase in (Phase.FIXATE, Phase.APPROACH)
-        if looking and self._middle_pose is not None and percept.flow.valid:
+        if looking and percept.flow.valid:
             self._memory = remember(
                 self._memory,
                 percept.zfc,
-                self._perception.flow_intrinsics,
-                self._middle_pose,
+                percept.flow.intrinsics,
+                percept.T_base_cam,
                 percept.flow.time,
                 self._memory_settings,
             )
-        self._middle_pose = T_base_cam
 
     def _obstacle_term(self, percept: Percept, T_base_cam: FloatArray) -> ObstacleTerm:
         points, evidence = believed_points(self._memory, self._memory_settings)
@@ -141,8 +137,9 @@ class ServoPolicy:
         """Camera position, shape (3,), in base, at which an open-loop phase ends."""
         if phase is Phase.GRASP:
             point = percept.fixation.point_base.copy()
-            if self._support_height_m is not None:
-                point[2] = max(point[2], self._support_height_m + self.gains.finger_room)
+            support = self._perception.support_height_m
+            if support is not None:
+                point[2] = max(point[2], support + self.gains.finger_room)
             return point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA
         if phase is Phase.LIFT:
             return T_base_cam[:3, 3] + [0.0, 0.0, self.gains.lift_height]
@@ -210,7 +207,8 @@ class ServoPolicy:
 
     def _shunned_direction(self, obstacle: ObstacleTerm) -> FloatArray:
         """obs_xy of unit length; what is straight ahead is passed above."""
-        direction = obstacle.centre + np.array([0.0, self.gains.obstacle_up])
+        # Clipped, so that "up" never turns into a way down to the table.
+        direction = np.clip(obstacle.centre, -1.0, 1.0) + np.array([0.0, self.gains.obstacle_up])
         return direction / max(float(np.linalg.norm(direction)), 1e-6)
 
     def _roll_error(self, percept: Percept, T_base_cam: FloatArray) -> float:
@@ -220,19 +218,18 @@ class ServoPolicy:
         if percept.fixation.distance_m < self.gains.align_distance and seen.visible and not seen.touches_border:
             return narrow_axis(seen.mask, roll, self.gains.max_roll)
         # Looking straight down, level is undefined; the correction fades before.
-        return -roll * min(1.0, 6.0 * float(np.hypot(T_base_cam[2, 0], T_base_cam[2, 1])))
+        off_vertical = float(np.hypot(T_base_cam[2, 0], T_base_cam[2, 1]))
+        return -roll * min(1.0, self.gains.level_fade * off_vertical)
 
     def _grasping_twist(self, T_base_cam: FloatArray, goal: FloatArray) -> FloatArray:
         """Bring the tool to the target through a funnel: first in line with the approach axis, then forward."""
-        axis = T_base_cam[:3, 2]
-        offset = goal - T_base_cam[:3, 3]
-        aside = float(np.linalg.norm(offset - axis * (axis @ offset)))
-        waypoint = goal - axis * min(2.0 * max(0.0, aside - 0.005), 0.06)
-        return servo_laws.pose_twist(T_base_cam, waypoint, self.gains.tool_gain, self.gains.tool_speed)
+        gains = self.gains
+        waypoint = servo_laws.funnel_waypoint(T_base_cam, goal, gains.funnel_slope, gains.funnel_length)
+        return servo_laws.pose_twist(T_base_cam, waypoint, gains.tool_gain, gains.tool_speed)
 
     def _searching_twist(self, time: float) -> FloatArray:
         """Turn the camera on a widening spiral about where it looked first."""
-        phase = 1.6 * math.sqrt(max(time - self._phase_start, 0.0)) * 2.0
+        phase = self.gains.search_widening * math.sqrt(max(time - self._phase_start, 0.0))
         twist = np.zeros(6)
         twist[3:5] = self.gains.search_rate * np.array([math.cos(phase), math.sin(phase)])
         return twist

@@ -13,7 +13,9 @@ from gymnasium.utils.env_checker import check_env
 import fixation_gym
 from fixation_gym.envs.config import SCENARIO_NAMES
 from fixation_gym.geometry.rigid import pose_to_matrix
+from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import TWIST_LIMITS
+from fixation_gym.types import Observation
 
 pytestmark = pytest.mark.sim
 SMALL = (64, 80)
@@ -31,6 +33,7 @@ INFO_KEYS = {
 @pytest.fixture(scope="module")
 def env():
     env = gym.make("FixationPick-v0", scenario="opaque", image_size=SMALL)
+    env.reset(seed=0)  # robosuite warns when it is first imported; the checker's warnings are what counts
     yield env
     env.close()
 
@@ -75,6 +78,29 @@ def test_the_same_seed_gives_the_same_trajectory_bit_by_bit_after_another_episod
     first = rollout(env, seed=4)
     rollout(env, seed=9)
     assert_same(first, rollout(env, seed=4))
+
+
+def test_a_scene_leaves_nothing_behind_in_the_model():
+    env, other = (gym.make("FixationPick-v0", scenario=name, image_size=SMALL) for name in ("mirror", "translucent"))
+    for environment in (env, other):
+        environment.reset(seed=0)
+    sim, scene, in_between = env.unwrapped.sim, env.unwrapped.scene, other.unwrapped.scene
+
+    def snapshot():
+        model = sim.model
+        arrays = {name: getattr(model, name) for name in dir(model) if not name.startswith("_")}
+        arrays = {name: value.copy() for name, value in arrays.items() if isinstance(value, np.ndarray)}
+        return {**arrays, "meaninertia": np.array(model.stat.meaninertia), "qpos": sim.data.qpos.copy()}
+
+    sim.reset(scene)
+    before = snapshot()
+    sim.reset(in_between)
+    assert any(not np.array_equal(before[name], value) for name, value in snapshot().items())
+    sim.reset(scene)
+    for name, value in snapshot().items():
+        np.testing.assert_array_equal(value, before[name], err_msg=name)
+    env.close()
+    other.close()
 
 
 def test_another_process_gives_the_same_trajectory(env):
@@ -219,6 +245,62 @@ def test_pushing_an_obstacle_counts_as_a_collision(env):
     assert reward < -4.0
 
 
+def test_driving_the_hand_into_an_obstacle_is_a_collision_by_force():
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=SMALL)
+    env.reset(seed=0)
+    sim = env.unwrapped.sim
+    hit = False
+    for _ in range(150):
+        pose = sim.arm_state().camera_pose
+        offset = pose[:3, :3].T @ (sim.body_position(sim.obstacles[0]) - sim.tool_position())
+        velocity = 0.1 * offset / np.linalg.norm(offset)
+        _, hit = sim.step(np.array([*velocity, 0.0, 0.0, 0.0]), -1.0, sim.substeps)
+        if hit:
+            break
+    assert hit
+    assert sim.obstacle_push() < 0.01  # the force was felt before the obstacle had moved a centimetre
+    env.close()
+
+
+def test_image_latency_shows_an_earlier_state_without_touching_the_physics(ideal_env):
+    sim = ideal_env.unwrapped.sim
+    ideal_env.reset(seed=1)
+    twist = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(10):
+        sim.step(twist, -1.0, sim.substeps)
+    exposed, _ = sim.step(twist, -1.0, sim.substeps - 5)  # 10 ms
+    travelled = (sim.data.qpos - exposed)[:7]
+    assert sim.arm_state().jacobian @ travelled == pytest.approx(0.01 * twist, abs=2e-4)
+
+
+def test_success_needs_the_target_lifted_for_half_a_second(env):
+    env.reset(seed=0)
+    sim = env.unwrapped.sim
+    joint = sim.data.joint("target_joint")
+    joint.qpos[2] += 0.12
+    sim.model.body("target").gravcomp[0] = 1.0
+    outcomes = [env.step(np.zeros(7, np.float32)) for _ in range(13)]
+    assert [terminated for _, _, terminated, _, _ in outcomes] == [False] * 12 + [True]
+    assert outcomes[-1][1] > 5.0
+    assert outcomes[-1][4]["is_success"]
+
+
+@pytest.mark.parametrize("frequency", [10, 50])
+def test_other_control_frequencies_move_as_far_per_second_and_keep_the_flow_valid(frequency):
+    env = gym.make("FixationPick-v0", image_size=SMALL, control_frequency=frequency, sensor_noise="ideal")
+    perception = Perception(env.unwrapped.intrinsics)
+    first, _ = env.reset(seed=0)
+    perception.update(Observation.from_dict(first))
+    valid = []
+    for _ in range(frequency):
+        obs, *_ = env.step(np.array([0.4, 0, 0, 0, 0, 0, 0], np.float32))
+        valid.append(perception.update(Observation.from_dict(obs)).flow.valid)
+    assert obs["time"][0] == pytest.approx(1.0)
+    assert np.linalg.norm(obs["camera_pose"][:3] - first["camera_pose"][:3]) == pytest.approx(0.06, abs=0.006)
+    assert all(valid[2:])
+    env.close()
+
+
 def test_nothing_private_reaches_the_observation(env):
     obs, _ = env.reset(seed=0)
     assert set(obs) == {"rgb", "joint_pos", "joint_vel", "gripper_width", "camera_pose", "camera_twist", "time"}
@@ -242,6 +324,15 @@ def test_rendered_views_show_something(view):
     assert frame.ndim == 3
     assert frame.std() > 10.0
     env.close()
+    env.close()
+
+
+def test_human_mode_without_a_display_says_what_to_use(monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    env = gym.make("FixationPick-v0", image_size=SMALL, render_mode="human")
+    with pytest.raises(RuntimeError, match="rgb_array"):
+        env.reset(seed=0)
     env.close()
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Generator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import imageio_ffmpeg
@@ -11,8 +13,9 @@ import pytest
 from evaluation_fakes import FakeEnv, FakePolicy
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation import demo, workers
+from fixation_gym.evaluation import demo, video, workers
 from fixation_gym.evaluation.evaluate import EvaluationConfig
+from fixation_gym.evaluation.storage import EpisodeStore
 
 CONFIG = EvaluationConfig(scenarios=("clear", "mirror"), episodes=2)
 
@@ -29,6 +32,10 @@ def envs(monkeypatch: pytest.MonkeyPatch) -> list[FakeEnv]:
     monkeypatch.setattr(workers, "make_env", make_env)
     monkeypatch.setattr(workers, "make_policy", lambda name, env: FakePolicy())
     return made
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_a_demo_leaves_video_sheet_episodes_and_summary(tmp_path: Path, envs: list[FakeEnv]) -> None:
@@ -51,7 +58,110 @@ def test_a_demo_leaves_video_sheet_episodes_and_summary(tmp_path: Path, envs: li
 
 def test_a_demo_replaces_an_earlier_one(tmp_path: Path, envs: list[FakeEnv]) -> None:
     demo.run_demo(CONFIG, tmp_path)
-    assert demo.run_demo(EvaluationConfig(scenarios=("clear",), episodes=1), tmp_path)["scenarios"].keys() == {"clear"}
+    summary = demo.run_demo(EvaluationConfig(scenarios=("clear",), episodes=1), tmp_path)
+    assert summary["scenarios"].keys() == {"clear"}
+    assert json.loads((tmp_path / "summary.json").read_text()) == summary
+    assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == 1
+    assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "demo.mp4"))[0] == 5 + 10
+
+
+def break_first_env(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(workers, "make_env", raise_broken)
+
+
+def break_second_scenario(patch: pytest.MonkeyPatch) -> None:
+    make_env = workers.make_env
+
+    def make(cell: workers.Cell, **options: Any) -> Any:
+        return raise_broken() if cell["scenario"] == "mirror" else make_env(cell, **options)
+
+    patch.setattr(workers, "make_env", make)
+
+
+def break_encoder(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(video.imageio_ffmpeg, "write_frames", raise_broken)
+
+
+def break_ffmpeg(patch: pytest.MonkeyPatch) -> None:
+    """An ffmpeg that accepts every frame, and then writes nothing."""
+
+    def write_frames(*args: Any, **kwargs: Any) -> Generator[None, Any, None]:
+        while True:
+            yield
+
+    patch.setattr(video.imageio_ffmpeg, "write_frames", write_frames)
+
+
+def break_sheet(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(demo, "contact_sheet", raise_broken)
+
+
+def raise_broken(*args: Any, **kwargs: Any) -> Any:
+    raise OSError("broken")
+
+
+@pytest.mark.parametrize(
+    "break_something", [break_first_env, break_second_scenario, break_encoder, break_ffmpeg, break_sheet]
+)
+def test_a_demo_that_fails_leaves_the_folder_as_it_was(
+    tmp_path: Path,
+    envs: list[FakeEnv],
+    monkeypatch: pytest.MonkeyPatch,
+    break_something: Callable[[pytest.MonkeyPatch], None],
+) -> None:
+    def try_broken(out: Path) -> None:
+        with monkeypatch.context() as patch:
+            break_something(patch)
+            with pytest.raises(OSError, match=r"broken|No such file"):
+                demo.run_demo(CONFIG, out)
+
+    try_broken(tmp_path / "new")
+    assert list((tmp_path / "new").iterdir()) == []
+    demo.run_demo(CONFIG, tmp_path / "old")
+    before = contents(tmp_path / "old")
+    assert len(before) == 5
+    try_broken(tmp_path / "old")
+    assert contents(tmp_path / "old") == before
+    assert all(env.closed for env in envs)
+
+
+def test_two_demos_at_once_do_not_meet(tmp_path: Path, envs: list[FakeEnv], monkeypatch: pytest.MonkeyPatch) -> None:
+    make_env = workers.make_env
+    refused: list[str] = []
+
+    def make(cell: workers.Cell, **options: Any) -> Any:
+        before = contents(tmp_path)
+        with pytest.raises(UsageError, match="in use by another run") as error:
+            demo.run_demo(CONFIG, tmp_path)
+        refused.append(str(error.value))
+        assert contents(tmp_path) == before
+        return make_env(cell, **options)
+
+    monkeypatch.setattr(workers, "make_env", make)
+    summary = demo.run_demo(CONFIG, tmp_path)
+    assert len(refused) == 2
+    assert json.loads((tmp_path / "summary.json").read_text()) == summary
+    assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == 4
+
+
+def test_a_demo_does_not_enter_a_running_evaluation(tmp_path: Path, envs: list[FakeEnv]) -> None:
+    with EpisodeStore(tmp_path, {"command": "evaluate"}), pytest.raises(UsageError, match="in use by another run"):
+        demo.run_demo(CONFIG, tmp_path)
+    assert envs == []
+
+
+def test_what_a_killed_demo_left_is_removed(tmp_path: Path, envs: list[FakeEnv]) -> None:
+    with EpisodeStore(tmp_path / ".demo.part", {"command": "demo", "policy": "blind"}):
+        pass
+    demo.run_demo(CONFIG, tmp_path)
+    assert not (tmp_path / ".demo.part").exists()
+
+
+def test_a_folder_in_the_place_of_the_video_is_an_error_before_filming(tmp_path: Path, envs: list[FakeEnv]) -> None:
+    (tmp_path / "demo.mp4").mkdir()
+    with pytest.raises(UsageError, match=r"demo\.mp4 is a folder"):
+        demo.run_demo(CONFIG, tmp_path)
+    assert envs == []
 
 
 def test_a_demo_never_replaces_an_evaluation(tmp_path: Path, envs: list[FakeEnv]) -> None:

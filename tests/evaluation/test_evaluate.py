@@ -40,7 +40,7 @@ def test_the_summary_has_the_documented_keys(tmp_path: Path) -> None:
     assert clear["success_ci95"] == pytest.approx([0.1500, 0.8500], abs=1e-4)
     assert clear["collision_free_ci95"] == pytest.approx([0.0456, 0.6994], abs=1e-4)
     assert clear["mean_time_s"] == pytest.approx(0.2)
-    assert clear["distance_mae_m"] == pytest.approx(0.13)
+    assert clear["distance_mae_m"] == pytest.approx(0.05)
     assert clear["fixation_rms_px"] == pytest.approx(12.5**0.5)
     assert clear["distance_error_at_grasp_median_m"] == pytest.approx(0.05)
 

@@ -25,7 +25,9 @@ def test_an_estimate_is_compared_with_the_truth_of_its_own_observation() -> None
     result = run_episode(FakeEnv(), FakePolicy(), seed=2)
     # Decisions at 1.0, 0.9, 0.8, 0.7 and 0.6 m; the estimate is 0.85 m; the approach ends at 0.8 m.
     assert result.distance_error_at_grasp_m == pytest.approx(0.05)
-    assert result.distance_mae_m == pytest.approx(np.mean([0.15, 0.05, 0.05, 0.15, 0.25]))
+    assert result.distance_mae_m == pytest.approx(
+        np.mean([0.05, 0.05])
+    )  # only while the gaze is held: at 0.9 and 0.8 m
 
 
 def test_fixation_error_counts_only_while_the_gaze_is_held() -> None:

@@ -5,13 +5,22 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from evaluation_fakes import FakeEnv, FakePolicy
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.rollout import run_episode
-from fixation_gym.evaluation.storage import EPISODES_FILE, RUN_FILE, EpisodeStore, make_folder, write_json
+from fixation_gym.evaluation.storage import (
+    EPISODES_FILE,
+    RUN_FILE,
+    SUMMARY_FILE,
+    EpisodeStore,
+    folder_lock,
+    make_folder,
+    write_json,
+)
 
 RUN = {"policy": "servo", "image_size": (240, 320)}
 RESULT = run_episode(FakeEnv(), FakePolicy(), seed=0, scenario="clear", policy_name="servo")
@@ -81,6 +90,59 @@ def test_a_folder_in_use_is_an_error(tmp_path: Path) -> None:
     with EpisodeStore(tmp_path, RUN), pytest.raises(UsageError, match="in use"):
         EpisodeStore(tmp_path, RUN)
     assert stored_seeds(tmp_path) == []
+
+
+def test_a_folder_in_use_is_not_judged_before_it_is_free(tmp_path: Path) -> None:
+    with EpisodeStore(tmp_path, RUN), pytest.raises(UsageError, match="in use"):
+        EpisodeStore(tmp_path, {**RUN, "policy": "blind"})
+
+
+def test_a_lock_leaves_no_file_and_ends_with_an_error(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), folder_lock(tmp_path):
+        raise KeyboardInterrupt
+    with folder_lock(tmp_path):
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_refused_run_frees_the_folder_and_leaves_it_as_it_was(tmp_path: Path) -> None:
+    write_json(tmp_path / RUN_FILE, {**RUN, "policy": "blind"})
+    for _ in range(2):
+        with pytest.raises(UsageError, match="another run, with policy"):
+            EpisodeStore(tmp_path, RUN)
+    assert [path.name for path in tmp_path.iterdir()] == [RUN_FILE]
+
+
+@pytest.mark.parametrize("name", [RUN_FILE, EPISODES_FILE, SUMMARY_FILE])
+def test_a_folder_in_the_place_of_a_file_is_an_error(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    with pytest.raises(UsageError, match=f"{name} is a folder where a file is needed; choose another --out"):
+        EpisodeStore(tmp_path, RUN)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_episodes_that_cannot_be_opened_are_an_error(tmp_path: Path) -> None:
+    fill(tmp_path, range(1))
+    (tmp_path / EPISODES_FILE).unlink()
+    (tmp_path / EPISODES_FILE).symlink_to(tmp_path / "nowhere" / "file")
+    with pytest.raises(UsageError, match=r"cannot use the results in .*No such file.*; choose another --out"):
+        EpisodeStore(tmp_path, RUN)
+
+
+@pytest.mark.parametrize("name", [RUN_FILE, EPISODES_FILE])
+def test_a_file_without_permission_is_an_error(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(tmp_path, range(1))
+    real_open = Path.open
+
+    def refuse(path: Path, *args: Any, **kwargs: Any) -> Any:  # root is refused nothing by a file's mode
+        if path.name == name:
+            raise PermissionError(13, "Permission denied", str(path))
+        return real_open(path, *args, **kwargs)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", refuse)
+        with pytest.raises(UsageError, match=rf"{name}.*; choose another --out"):
+            EpisodeStore(tmp_path, RUN)
+    assert stored_seeds(tmp_path) == [0]
 
 
 def test_a_folder_that_cannot_be_made_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:

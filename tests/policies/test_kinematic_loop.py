@@ -6,7 +6,8 @@ import pytest
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at, matrix_to_pose
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.robot import CAMERA_FOVY, TOOL_IN_CAMERA
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.robot import CAMERA_FOVY, TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import Observation
 from policies.servo.servo_policy import ServoPolicy
 
@@ -29,7 +30,7 @@ def picture(T_base_cam):
 
 
 def run(policy, T_base_cam, seconds, visible=lambda time: True):
-    twist, trail = np.zeros(6), []
+    perception, twist, trail = Perception(INTRINSICS), np.zeros(6), []
     for k in range(round(seconds / PERIOD)):
         time = k * PERIOD
         image = picture(T_base_cam) if visible(time) else np.full((120, 160, 3), 128, np.uint8)
@@ -42,9 +43,8 @@ def run(policy, T_base_cam, seconds, visible=lambda time: True):
             camera_twist=twist,
             gripper_width=0.08 if policy.estimate is None or policy.estimate.phase != "lift" else 0.05,
         )
-        policy.percept = policy._perception.update(observation)
-        twist = policy.command(policy.percept, observation).camera_twist
-        trail.append((time, policy.estimate, T_base_cam))
+        twist = policy.command(perception.update(observation), observation).camera_twist
+        trail.append((time, policy.estimate, T_base_cam, twist))
         T_base_cam = T_base_cam @ exp_twist(twist, PERIOD)
     return trail
 
@@ -56,11 +56,11 @@ def start():
 
 @pytest.fixture
 def policy():
-    return ServoPolicy(INTRINSICS, support_height_m=None)
+    return ServoPolicy(Perception(INTRINSICS))
 
 
 def test_the_gaze_reaches_and_holds_the_target(policy, start):
-    for time, _, T_base_cam in run(policy, start, 4.0):
+    for time, _, T_base_cam, _ in run(policy, start, 4.0):
         point = T_base_cam[:3, :3].T @ (TARGET - T_base_cam[:3, 3])
         if time > 2.0:
             assert np.linalg.norm(point[:2] / point[2]) < 0.02
@@ -68,27 +68,29 @@ def test_the_gaze_reaches_and_holds_the_target(policy, start):
 
 def test_the_distance_is_known_within_two_percent_before_the_approach(policy, start):
     trail = run(policy, start, 4.0)
-    _, estimate, T_base_cam = next(item for item in trail if item[1].phase == "approach")
+    _, estimate, T_base_cam, _ = next(item for item in trail if item[1].phase == "approach")
     true = T_base_cam[:3, 2] @ (TARGET - T_base_cam[:3, 3])
     assert estimate.distance_m == pytest.approx(true, rel=0.02)
 
 
 def test_the_tool_ends_at_the_target(policy, start):
     trail = run(policy, start, 16.0)
-    T_base_cam = next(pose for _, estimate, pose in trail if estimate.phase == "close")
+    T_base_cam = next(pose for _, estimate, pose, _ in trail if estimate.phase == "close")
     tool = T_base_cam[:3, :3] @ TOOL_IN_CAMERA + T_base_cam[:3, 3]
     assert np.linalg.norm(tool - TARGET) < 0.012
 
 
 def test_a_lost_target_is_recovered(policy, start):
     trail = run(policy, start, 9.0, visible=lambda time: not 2.0 < time < 4.0)
-    phases = [estimate.phase for _, estimate, _ in trail]
+    phases = [estimate.phase for _, estimate, _, _ in trail]
     lost = phases[round(3.0 / PERIOD) : round(4.0 / PERIOD)]
     assert set(lost) <= {"recover", "search"}
     assert phases[-1] in ("fixate", "approach", "grasp")
 
 
 def test_commands_stay_within_the_limits_and_are_repeatable(policy, start):
-    first = [estimate for _, estimate, _ in run(policy, start, 3.0)]
+    first = [twist for *_, twist in run(policy, start, 3.0)]
     policy.reset()
-    assert first == [estimate for _, estimate, _ in run(policy, start, 3.0)]
+    np.testing.assert_array_equal(first, [twist for *_, twist in run(policy, start, 3.0)])
+    assert np.all(np.abs(first) <= TWIST_LIMITS * (1 + 1e-9))
+    assert np.max(np.abs(first)) > 0.01

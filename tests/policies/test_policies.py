@@ -13,12 +13,11 @@ from policies.catalogue import POLICY_NAMES, make_policy
 def play(env, policy, seed):
     obs, _ = env.reset(seed=seed)
     policy.reset(seed)
-    errors, done = [], False
+    done = False
     while not done:
         action = policy.act(obs)
         assert env.action_space.contains(action)
         obs, _, terminated, truncated, info = env.step(action)
-        errors.append((policy.estimate.phase, policy.estimate.distance_m))
         done = terminated or truncated
     return info
 

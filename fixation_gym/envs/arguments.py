@@ -1,0 +1,51 @@
+"""Checks of the environment's arguments, and the spaces that follow from them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+
+def checked_image_size(image_size: Any) -> tuple[int, int]:
+    """Return (height, width) as plain integers.
+
+    Raises:
+        ValueError: if it is not two whole numbers within 32..2048.
+    """
+    sizes = tuple(image_size) if isinstance(image_size, (tuple, list)) else ()
+    whole = all(isinstance(size, (int, np.integer)) and not isinstance(size, bool) for size in sizes)
+    if len(sizes) != 2 or not whole or not all(32 <= size <= 2048 for size in sizes):
+        raise ValueError(f"image_size must be (height, width), two whole numbers within 32..2048, got {image_size!r}")
+    return int(sizes[0]), int(sizes[1])
+
+
+def require_choice(name: str, value: str | None, allowed: tuple[str | None, ...]) -> None:
+    """Check an argument that has a few allowed values.
+
+    Raises:
+        ValueError: for another value; the message lists the allowed ones.
+    """
+    if value not in allowed:
+        raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
+
+
+def observation_space(height: int, width: int) -> spaces.Dict:
+    """Observation space of ``FixationPick-v0`` for a wrist image of that size; units as in its table."""
+
+    def box(*bounds: float) -> spaces.Box:
+        high = np.array(bounds, dtype=np.float32)
+        return spaces.Box(-high, high, dtype=np.float32)
+
+    return spaces.Dict(
+        {
+            "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
+            "joint_pos": box(*[4.0] * 7),
+            "joint_vel": box(*[10.0] * 7),
+            "gripper_width": spaces.Box(0.0, 0.1, (1,), np.float32),
+            "camera_pose": box(*[2.0] * 3, *[1.0] * 4),
+            "camera_twist": box(*[5.0] * 3, *[20.0] * 3),
+            "time": spaces.Box(0.0, 3600.0, (1,), np.float32),
+        }
+    )

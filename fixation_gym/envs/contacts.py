@@ -1,0 +1,73 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's functions have no type stubs.)
+"""Whether the robot touches an obstacle, and how near it came."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fixation_gym.envs.config import COLLISION_FORCE
+
+OTHER, ROBOT, OBSTACLE = 0, 1, 2
+"""Owners of geoms."""
+LARGEST_CLEARANCE = 0.5
+"""Distances are not measured beyond this, m; it is also the clearance of a scene without obstacles."""
+
+Owners = NDArray[np.int64]
+
+
+def geom_owners(model: Any, robot_bodies: tuple[str, ...]) -> Owners:
+    """Owner of every geom of the model, shape (ngeom,); ``robot_bodies`` are beginnings of body names."""
+    owners = np.full(model.ngeom, OTHER, dtype=np.int64)
+    for geom in range(model.ngeom):
+        body = model.body(model.geom_bodyid[geom]).name
+        if body.startswith(robot_bodies):
+            owners[geom] = ROBOT
+        elif body.startswith("obstacle"):
+            owners[geom] = OBSTACLE
+    return owners
+
+
+def robot_hits_obstacle(model: Any, data: Any, owners: Owners) -> bool:
+    """Whether a robot-obstacle contact carries more than ``COLLISION_FORCE``."""
+    if data.ncon == 0:
+        return False
+    pairs = owners[data.contact.geom]
+    force = np.zeros(6)
+    for contact in np.flatnonzero((pairs.min(axis=1) == ROBOT) & (pairs.max(axis=1) == OBSTACLE)):
+        mujoco.mj_contactForce(model, data, int(contact), force)
+        if np.linalg.norm(force[:3]) > COLLISION_FORCE:
+            return True
+    return False
+
+
+def clearance(model: Any, data: Any, owners: Owners) -> float:
+    """Smallest distance between robot and obstacles, m, at most ``LARGEST_CLEARANCE``; 0 or below in contact."""
+    collides = model.geom_contype + model.geom_conaffinity > 0
+    robot, obstacle = (np.flatnonzero((owners == owner) & collides) for owner in (ROBOT, OBSTACLE))
+    if not len(obstacle):
+        return LARGEST_CLEARANCE
+    gaps = np.linalg.norm(data.geom_xpos[robot][:, None] - data.geom_xpos[obstacle][None], axis=-1)
+    gaps -= model.geom_rbound[robot][:, None] + model.geom_rbound[obstacle][None]
+    nearest = LARGEST_CLEARANCE
+    for flat in np.argsort(gaps, axis=None):
+        i, j = np.unravel_index(flat, gaps.shape)
+        if gaps[i, j] >= nearest:  # bounding spheres: all that follow are farther
+            break
+        nearest = min(nearest, _geom_distance(model, data, int(robot[i]), int(obstacle[j]), nearest))
+    return nearest
+
+
+def _geom_distance(model: Any, data: Any, first: int, second: int, largest: float) -> float:
+    distance = mujoco.mj_geomDistance(model, data, first, second, largest, None)
+    if distance == 0.0:
+        # MuJoCo 3.9's own convex routine says exactly 0 for some pairs that are far apart; libccd does not.
+        flags = model.opt.disableflags
+        model.opt.disableflags = flags | mujoco.mjtDisableBit.mjDSBL_NATIVECCD
+        distance = mujoco.mj_geomDistance(model, data, first, second, largest, None)
+        model.opt.disableflags = flags
+    return float(distance)
