@@ -1,7 +1,7 @@
 """Choice of the OpenGL library that MuJoCo renders with.
 
-MuJoCo reads ``MUJOCO_GL`` once, when it is imported, and robosuite sets it to ``egl`` whether or not EGL works.
-So ``select_backend`` has to run before either is imported.
+MuJoCo reads ``MUJOCO_GL`` when it is imported, and robosuite sets it to ``egl`` whether or not EGL works. So
+``select_backend`` runs before the environment imports them; if MuJoCo is there already, it is made to read again.
 """
 
 from __future__ import annotations

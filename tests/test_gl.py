@@ -25,6 +25,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return backend == "osmesa"
 
     monkeypatch.setattr(gl, "renders", renders)
+    monkeypatch.setattr(gl, "_CONTEXT_MODULE", "not imported")  # other tests go on rendering in this process
     return names
 
 
@@ -82,3 +83,17 @@ def test_choosing_a_backend_does_not_import_the_simulator() -> None:
 def test_a_backend_that_does_not_exist_does_not_render() -> None:
     assert not gl.renders("no-such-backend")
     assert any(gl.renders(backend) for backend in gl.CANDIDATES)
+
+
+@pytest.mark.sim
+def test_mujoco_imported_first_still_renders_without_a_display() -> None:
+    code = (
+        "import mujoco, gymnasium, fixation_gym\n"
+        "env = gymnasium.make('FixationPick-v0', image_size=(48, 64))\n"
+        "print(env.reset(seed=0)[0]['rgb'].std())"
+    )
+    hidden = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "FIXATION_GYM_GL", "DISPLAY")
+    environment = {key: value for key, value in os.environ.items() if key not in hidden}
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+    assert result.returncode == 0, result.stderr
+    assert float(result.stdout.split()[-1]) > 5.0

@@ -71,7 +71,7 @@ def test_the_environment_passes_stable_baselines_checker(env):
     from stable_baselines3.common.env_checker import check_env as check_sb3_env
 
     check_sb3_env(env.unwrapped, warn=False)
-    assert env.unwrapped.spec.max_episode_steps == 625
+    assert env.spec.max_episode_steps == 625
 
 
 def test_the_same_seed_gives_the_same_trajectory_bit_by_bit_after_another_episode(env):
@@ -200,12 +200,12 @@ def test_a_point_projects_onto_its_rendered_blob_within_a_pixel():
     for seed in range(3):
         obs, _ = env.reset(seed=seed)
         rgb = obs["rgb"].astype(int)
-        rows, columns = np.nonzero((rgb[..., 0] > 90) & (rgb[..., 1] < 50) & (rgb[..., 2] < 50))
+        # A ratio, so that the ball's shaded side counts as well.
+        rows, columns = np.nonzero((rgb[..., 0] > 20) & (3 * rgb[..., 1:].max(axis=-1) < rgb[..., 0]))
         T_base_cam = pose_to_matrix(np.float64(obs["camera_pose"]))
         centre = env.unwrapped.sim.body_position("target")
         pixel = env.unwrapped.intrinsics.project(T_base_cam[:3, :3].T @ (centre - T_base_cam[:3, 3]))
-        blob = [0.5 * (columns.min() + columns.max()), 0.5 * (rows.min() + rows.max())]
-        assert pixel == pytest.approx(blob, abs=1.0)
+        assert pixel == pytest.approx([columns.mean(), rows.mean()], abs=1.0)
     env.close()
 
 
@@ -278,7 +278,7 @@ def test_success_needs_the_target_lifted_for_half_a_second(env):
     sim = env.unwrapped.sim
     joint = sim.data.joint("target_joint")
     joint.qpos[2] += 0.12
-    sim.model.body("target").gravcomp[0] = 1.0
+    sim.model.body_gravcomp[sim.model.body("target").id] = 1.0
     outcomes = [env.step(np.zeros(7, np.float32)) for _ in range(13)]
     assert [terminated for _, _, terminated, _, _ in outcomes] == [False] * 12 + [True]
     assert outcomes[-1][1] > 5.0
