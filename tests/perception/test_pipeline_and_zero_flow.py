@@ -205,10 +205,16 @@ def test_time_must_increase_until_reset():
     assert perception.update(observation).time == observation.time
 
 
-def test_an_image_of_the_wrong_shape_is_refused():
+def test_input_of_the_wrong_kind_is_refused_with_what_is_asked_for():
     perception, _, observation, _ = run(poster_scene(), circling, 1)
-    with pytest.raises(ValueError, match="rgb has shape"):
-        perception.update(replace(observation, rgb=observation.rgb[:-1], time=1.0))
+    later = replace(observation, time=1.0)
+    with pytest.raises(ValueError, match=r"ask for uint8 of shape"):
+        perception.update(replace(later, rgb=observation.rgb[:-1]))
+    with pytest.raises(ValueError, match=r"rgb is float64 .* ask for uint8"):
+        perception.update(replace(later, rgb=observation.rgb / 255.0))
+    for pose in (np.full(7, np.nan), np.zeros(7), np.ones(6)):
+        with pytest.raises(ValueError, match="camera_pose must be a finite position and quaternion"):
+            perception.update(replace(later, camera_pose=pose))
     with pytest.raises(ValueError, match="self_mask has shape"):
         Perception(CAMERA, self_mask=np.zeros((3, 3), bool))
 
