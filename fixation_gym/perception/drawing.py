@@ -6,10 +6,12 @@ import cv2
 import numpy as np
 
 from fixation_gym.perception.pipeline import Percept
-from fixation_gym.perception.zero_flow import UNKNOWN
+from fixation_gym.perception.zero_flow import UNKNOWN, obstacle_centre
 from fixation_gym.types import FloatArray, ImageArray
 
 FRONT_RGB = (255, 140, 0)
+_LEAST_SHOWN = 0.01
+"""Share of the map that must be in front before its centre of mass is marked."""
 """Nearer than the fixated object: orange."""
 BEHIND_RGB = (40, 110, 255)
 """Farther than the fixated object: blue."""
@@ -35,6 +37,7 @@ def draw_overlay(rgb: ImageArray, percept: Percept, scale: float = 1.0) -> Image
     canvas = _tint(np.asarray(canvas, np.uint8), percept)
     _draw_target(canvas, percept)
     _draw_cross(canvas)
+    _draw_obstacle_centre(canvas, percept)
     _draw_inset(canvas, percept.zfc.cells)
     _draw_text(canvas, percept)
     return canvas
@@ -90,6 +93,19 @@ def _draw_cross(canvas: ImageArray) -> None:
         end = (round(centre_x + outer * dx), round(centre_y + outer * dy))
         for colour, thickness in (((0, 0, 0), 4), ((255, 255, 255), 2)):
             cv2.line(canvas, start, end, colour, max(1, round(thickness * _unit(canvas))), cv2.LINE_AA)
+
+
+def _draw_obstacle_centre(canvas: ImageArray, percept: Percept) -> None:
+    """Ring at the centre of mass of what is in front, if there is enough of it."""
+    camera = percept.flow.intrinsics.scaled(canvas.shape[0], canvas.shape[1])
+    centre, share = obstacle_centre(percept.zfc, camera)
+    if share < _LEAST_SHOWN:
+        return
+    pixel = (round(camera.fx * centre[0] + camera.cx), round(camera.fy * centre[1] + camera.cy))
+    for colour, thickness in (((0, 0, 0), 5), (FRONT_RGB, 3)):
+        cv2.circle(
+            canvas, pixel, round(14 * _unit(canvas)), colour, max(1, round(thickness * _unit(canvas))), cv2.LINE_AA
+        )
 
 
 def _draw_inset(canvas: ImageArray, cells: ImageArray) -> None:
