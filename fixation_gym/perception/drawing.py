@@ -10,8 +10,6 @@ from fixation_gym.perception.zero_flow import UNKNOWN, obstacle_centre
 from fixation_gym.types import FloatArray, ImageArray
 
 FRONT_RGB = (255, 140, 0)
-_LEAST_SHOWN = 0.01
-"""Share of the map that must be in front before its centre of mass is marked."""
 """Nearer than the fixated object: orange."""
 BEHIND_RGB = (40, 110, 255)
 """Farther than the fixated object: blue."""
@@ -19,6 +17,10 @@ MOVING_RGB = (255, 0, 200)
 """Moves by itself: magenta."""
 TARGET_RGB = (255, 255, 255)
 """Outline of the target and gaze cross: white."""
+
+
+_LEAST_SHOWN = 0.01
+"""Share of the map that must be in front before its centre of mass is marked."""
 
 
 def draw_overlay(rgb: ImageArray, percept: Percept, scale: float = 1.0) -> ImageArray:
