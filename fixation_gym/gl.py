@@ -27,7 +27,7 @@ PROBE_MODEL = """
 
 _CHECKED = "FIXATION_GYM_GL"  # the backend that was seen working; child processes inherit it and do not probe again
 _CONTEXT_MODULE = "mujoco.rendering.classic.gl_context"
-_PROBE_TIMEOUT_S = 60.0  # EGL can hang when many processes share one GPU
+_PROBE_TIMEOUT_S = 180.0  # EGL can hang when many processes share one GPU; a busy machine is only slow
 _PROBE = f"""
 import mujoco
 model = mujoco.MjModel.from_xml_string('''{PROBE_MODEL}''')
