@@ -48,29 +48,35 @@ class Scene:
     def render(self, T_base_cam, intrinsics: Intrinsics, noise: float = 0.0, seed: int = 0, oversample: int = 2):
         """Image (H, W, 3) uint8, true depth (H, W) m and index of the visible rectangle (H, W)."""
         fine = intrinsics.scaled(intrinsics.height * oversample, intrinsics.width * oversample)
-        x, y = fine.grid
-        rays = (np.stack([x, y, np.ones_like(x)], -1) @ T_base_cam[:3, :3].T).astype(np.float32)
+        x, y = (axis.astype(np.float32) for axis in fine.grid)
         image = np.full((*x.shape, 3), 90.0, np.float32)
-        depth = np.full(x.shape, np.inf)
+        depth = np.full(x.shape, np.inf, np.float32)
         index = np.full(x.shape, -1)
+        R, origin = T_base_cam[:3, :3], T_base_cam[:3, 3]
         for number, rectangle in enumerate(self.rectangles):
             box = _bounding_box(rectangle, T_base_cam, fine)
-            ray = rays[box]
+            columns, rows = x[:1, box[1]], y[box[0], :1]
+
+            def along(direction, columns=columns, rows=rows):
+                """Component of every ray of the box along a base-frame direction."""
+                a, b, c = (direction @ R).astype(np.float32)
+                return a * columns + (b * rows + c)
+
+            offset = rectangle.centre - origin
+            lengths = np.linalg.norm(rectangle.half_u), np.linalg.norm(rectangle.half_v)
             normal = np.cross(rectangle.half_u, rectangle.half_v)
             with np.errstate(divide="ignore", invalid="ignore"):
-                z = ((rectangle.centre - T_base_cam[:3, 3]) @ normal) / (ray @ normal)
-            local = T_base_cam[:3, 3] + z[..., None] * ray - rectangle.centre
-            u = local @ rectangle.half_u / (rectangle.half_u @ rectangle.half_u)
-            v = local @ rectangle.half_v / (rectangle.half_v @ rectangle.half_v)
-            inside = u**2 + v**2 < 1 if rectangle.round else (abs(u) < 1) & (abs(v) < 1)
+                z = np.float32(offset @ normal) / along(normal)
+            unit_u, unit_v = rectangle.half_u / lengths[0], rectangle.half_v / lengths[1]
+            u = z * along(unit_u) - np.float32(offset @ unit_u)  # m
+            v = z * along(unit_v) - np.float32(offset @ unit_v)
+            relative = (u / lengths[0]) ** 2, (v / lengths[1]) ** 2
+            inside = relative[0] + relative[1] < 1 if rectangle.round else np.maximum(*relative) < 1
             hit = inside & (z > 1e-3) & (z < depth[box])
-            size = rectangle.texture.shape[0]
-            scale = size / rectangle.period
-            map_u = (u * np.linalg.norm(rectangle.half_u) * scale).astype(np.float32) % size
-            map_v = (v * np.linalg.norm(rectangle.half_v) * scale).astype(np.float32) % size
-            colour = cv2.remap(rectangle.texture, map_u, map_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-            image[box][hit] = colour[hit]
-            depth[box][hit] = z[hit]
+            scale = np.float32(rectangle.texture.shape[0] / rectangle.period)
+            colour = cv2.remap(rectangle.texture, u * scale, v * scale, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+            cv2.copyTo(colour, hit.astype(np.uint8), image[box])
+            np.copyto(depth[box], z, where=hit)
             index[box][hit] = number
         image = cv2.resize(image, (intrinsics.width, intrinsics.height), interpolation=cv2.INTER_AREA)
         image = image + noise * np.random.default_rng(seed).standard_normal(image.shape)

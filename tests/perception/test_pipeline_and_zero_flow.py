@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache, partial
 
 import cv2
 import numpy as np
@@ -28,15 +29,25 @@ def poster_scene():
     )
 
 
-def run(scene, pose_at, steps, camera=CAMERA, start=0, perception=None, **options):
+def frames(scene, pose_at, camera=CAMERA):
+    """Function of the frame number: observation, true depth, visible rectangle and pose, each rendered once."""
+
+    @cache
+    def frame(k):
+        pose = pose_at(0.04 * k)
+        return (*observe(scene, pose, 0.04 * k, camera), pose)
+
+    return frame
+
+
+def run(frame, steps, camera=CAMERA, start=0, perception=None, **options):
     """Feed frames; returns perception, last percept, last observation and the truth of the filter-centre frame."""
     perception = perception or Perception(camera, **options)
     truth = []
     for k in range(start, start + steps):
-        pose = pose_at(0.04 * k)
-        observation, depth, index = observe(scene, pose, 0.04 * k, camera)
+        observation, *true = frame(k)
         percept = perception.update(observation)
-        truth = [*truth[-1:], (depth, index, pose)]
+        truth = [*truth[-1:], true]
     return perception, percept, observation, truth[0]
 
 
@@ -49,6 +60,10 @@ def circling(t, v_z=0.0):
     return fixating_pose([v_z * t, 0.05 * np.cos(t) - 0.05, 0.05 * np.sin(t)], TARGET)
 
 
+POSTERS = frames(poster_scene(), circling)
+POSTERS_APPROACHED = frames(poster_scene(), partial(circling, v_z=0.05))
+
+
 def sign_scores(percept, truth):
     depth, _, pose = truth
     fixated = pose[:3, 2] @ (TARGET - pose[:3, 3])
@@ -59,14 +74,12 @@ def sign_scores(percept, truth):
     return right[used].mean(), right[used & front].mean(), used.mean()
 
 
-@pytest.mark.parametrize("v_z", [0.0, 0.05])
-def test_the_sign_is_right_also_while_approaching(v_z):
+@pytest.mark.parametrize("frame", [POSTERS, POSTERS_APPROACHED], ids=["circling", "approaching"])
+def test_the_sign_is_right_also_while_approaching(frame):
     scores = []
     perception, start = None, 0
     for steps in (16, 4):
-        perception, percept, _, truth = run(
-            poster_scene(), lambda t: circling(t, v_z), steps, start=start, perception=perception
-        )
+        perception, percept, _, truth = run(frame, steps, start=start, perception=perception)
         start += steps
         scores.append(sign_scores(percept, truth))
     accuracy, recall, share = np.mean(scores, axis=0)
@@ -77,7 +90,7 @@ def test_the_sign_is_right_also_while_approaching(v_z):
 
 
 def test_the_inverse_depth_of_each_pixel_is_right_within_its_stated_error():
-    _, percept, _, (depth, index, _) = run(poster_scene(), circling, 18)
+    _, percept, _, (depth, index, _) = run(POSTERS, 18)
     patches = [on_grid(index == number, percept) > 0 for number in (0, 2, 3)]
     for patch, margin in zip(patches, (9, 9, 9), strict=True):
         inner = cv2.erode(patch.astype(np.uint8), np.ones((margin, margin), np.uint8)).astype(bool)
@@ -88,7 +101,7 @@ def test_the_inverse_depth_of_each_pixel_is_right_within_its_stated_error():
 
 
 def test_the_map_shows_the_nearer_things_where_they_are_and_the_obstacle_centre_lies_among_them():
-    _, percept, _, (_, index, _) = run(poster_scene(), circling, 18)
+    _, percept, _, (_, index, _) = run(POSTERS, 18)
     near = cv2.resize(np.isin(index, (2, 3)).astype(np.float32), (CELLS, CELLS), interpolation=cv2.INTER_AREA)
     cells = percept.zfc.cells
     assert (cells[near > 0.9] > 200).mean() > 0.9
@@ -119,8 +132,9 @@ def over_the_table(t):
 
 def test_the_table_is_nearer_than_the_target_but_known_by_its_height():
     fronts = {}
+    frame = frames(tabletop(), over_the_table)
     for height in (None, 0.0):
-        _, percept, _, (_, index, _) = run(tabletop(), over_the_table, 18, support_height_m=height)
+        _, percept, _, (_, index, _) = run(frame, 18, support_height_m=height)
         front = percept.zfc.p_nearer > 0.9
         fronts[height] = [front[on_grid(index == number, percept) > 0].mean() for number in (0, 2)]
     assert fronts[None][0] > 0.2
@@ -152,7 +166,7 @@ def test_without_translation_everything_is_unknown(speed_rad_s):
             [[np.cos(turn), 0, np.sin(turn), 0], [0, 1, 0, 0], [-np.sin(turn), 0, np.cos(turn), 0], [0, 0, 0, 1]]
         )
 
-    _, percept, _, _ = run(poster_scene(), pose, 6)
+    _, percept, _, _ = run(frames(poster_scene(), pose), 6)
     assert percept.flow.valid
     assert not percept.zfc.supported.any()
     assert (percept.zfc.p_nearer == 0.5).all()
@@ -162,15 +176,14 @@ def test_without_translation_everything_is_unknown(speed_rad_s):
 
 
 def test_a_lost_target_makes_everything_unknown_and_its_distance_less_certain():
-    scene = poster_scene()
-    perception, before, _, _ = run(scene, circling, 12)
-    hidden = Scene([r for number, r in enumerate(scene.rectangles) if number != 1])
-    _, percept, _, _ = run(hidden, circling, 6, start=12, perception=perception)
+    perception, before, _, _ = run(POSTERS, 12)
+    hidden = Scene([r for number, r in enumerate(poster_scene().rectangles) if number != 1])
+    _, percept, _, _ = run(frames(hidden, circling), 6, start=12, perception=perception)
     assert not percept.fixation.visible
     assert (percept.zfc.cells == UNKNOWN).all()
     assert percept.fixation.distance_std_m > before.fixation.distance_std_m
     assert np.isfinite(percept.fixation.point_base).all()
-    _, percept, _, _ = run(scene, circling, 12, start=18, perception=perception)
+    _, percept, _, _ = run(POSTERS, 12, start=18, perception=perception)
     assert percept.fixation.visible
     assert percept.fixation.distance_m == pytest.approx(0.4, abs=0.02)
 
@@ -178,27 +191,27 @@ def test_a_lost_target_makes_everything_unknown_and_its_distance_less_certain():
 def test_the_robot_itself_is_no_obstacle():
     mask = np.zeros((CAMERA.height, CAMERA.width), bool)
     mask[:, :107] = True
-    _, percept, _, _ = run(poster_scene(), circling, 12, self_mask=mask)
+    _, percept, _, _ = run(POSTERS, 12, self_mask=mask)
     assert not percept.zfc.supported[:, :53].any()
     assert (percept.zfc.cells[:, :15] == UNKNOWN).all()
     assert percept.zfc.supported[:, 60:].any()
 
 
 def test_the_first_two_frames_and_those_after_a_gap_have_no_flow():
-    perception, first, _, _ = run(poster_scene(), circling, 1)
+    perception, first, _, _ = run(POSTERS, 1)
     assert not first.flow.valid
     assert (first.zfc.cells == UNKNOWN).all()
     assert first.fixation.initialised
-    _, third, _, _ = run(poster_scene(), circling, 2, start=1, perception=perception)
+    _, third, _, _ = run(POSTERS, 2, start=1, perception=perception)
     assert third.flow.valid
     assert third.flow.time == pytest.approx(0.04)
     assert third.time == pytest.approx(0.08)
-    _, after_gap, _, _ = run(poster_scene(), circling, 2, start=9, perception=perception)
+    _, after_gap, _, _ = run(POSTERS, 2, start=9, perception=perception)
     assert not after_gap.flow.valid
 
 
 def test_time_must_increase_until_reset():
-    perception, _, observation, _ = run(poster_scene(), circling, 2)
+    perception, _, observation, _ = run(POSTERS, 2)
     with pytest.raises(ValueError, match=r"time must increase.*call reset\(\) first"):
         perception.update(observation)
     perception.reset()
@@ -206,7 +219,7 @@ def test_time_must_increase_until_reset():
 
 
 def test_input_of_the_wrong_kind_is_refused_with_what_is_asked_for():
-    perception, _, observation, _ = run(poster_scene(), circling, 1)
+    perception, _, observation, _ = run(POSTERS, 1)
     later = replace(observation, time=1.0)
     with pytest.raises(ValueError, match=r"ask for uint8 of shape"):
         perception.update(replace(later, rgb=observation.rgb[:-1]))
@@ -223,7 +236,7 @@ def test_input_of_the_wrong_kind_is_refused_with_what_is_asked_for():
 def test_any_image_size_works(height, width):
     camera = Intrinsics.from_fovy(height, width, np.deg2rad(42.5))
     scene = Scene(poster_scene().rectangles[:3])
-    _, percept, observation, _ = run(scene, circling, 3, camera=camera)
+    _, percept, observation, _ = run(frames(scene, circling, camera), 3, camera=camera)
     assert percept.flow.valid
     assert percept.zfc.cells.shape == (CELLS, CELLS)
     assert percept.segmentation.mask.shape == (height, width)
@@ -232,7 +245,7 @@ def test_any_image_size_works(height, width):
 
 
 def test_the_overlay_is_a_new_image_that_shows_the_evidence():
-    _, percept, observation, _ = run(poster_scene(), circling, 14)
+    _, percept, observation, _ = run(POSTERS, 14)
     before = observation.rgb.copy()
     picture = draw_overlay(observation.rgb, percept, scale=2.0)
     np.testing.assert_array_equal(observation.rgb, before)

@@ -16,15 +16,14 @@ TARGET = np.array([0.55, 0.0, 0.0])
 RADIUS = 0.025
 UP = np.array([0.0, 0.0, 1.0])
 PERIOD = 0.04
+RAYS = np.stack([*INTRINSICS.grid, np.ones((120, 160))], -1)
+RAYS /= np.linalg.norm(RAYS, axis=-1, keepdims=True)
 
 
 def picture(T_base_cam):
     """A red ball before a grey wall, exactly projected: a pixel is red if its ray meets the ball."""
-    x, y = INTRINSICS.grid
-    rays = np.stack([x, y, np.ones_like(x)], -1) @ T_base_cam[:3, :3].T
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    offset = TARGET - T_base_cam[:3, 3]
-    along = rays @ offset
+    offset = T_base_cam[:3, :3].T @ (TARGET - T_base_cam[:3, 3])
+    along = RAYS @ offset
     hit = (along > 0) & (offset @ offset - along**2 < RADIUS**2)
     return np.where(hit[..., None], np.array([200, 10, 10]), 128).astype(np.uint8)
 
