@@ -1,16 +1,19 @@
-"""Joint velocities for a camera twist: damped least squares with a posture in the null space (Whitney 1969)."""
+"""Joint velocities for a camera twist: damped least squares with a posture in the null space (Whitney 1969).
+
+Compiled: it runs at every physics substep.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from fixation_gym.types import FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class JointLimits:
+class JointLimits(NamedTuple):
     """Limits of the arm, each of shape (n,)."""
 
     lower: FloatArray
@@ -21,6 +24,7 @@ class JointLimits:
     """Largest joint speeds, rad/s."""
 
 
+@njit(cache=True)
 def joint_velocities(
     jacobian: FloatArray,
     twist: FloatArray,
@@ -46,12 +50,45 @@ def joint_velocities(
     Returns:
         Shape (n,), rad/s.
     """
-    gram = jacobian @ jacobian.T
-    gram[np.diag_indices(6)] += damping**2
-    drift = posture_gain * (posture - joint_pos)
+    rows, joints = jacobian.shape
+    gram = np.empty((rows, rows))
+    rest = np.empty(rows)
+    for i in range(rows):
+        rest[i] = twist[i]
+        for k in range(joints):
+            rest[i] -= jacobian[i, k] * posture_gain * (posture[k] - joint_pos[k])
+        for j in range(i + 1):
+            gram[i, j] = damping**2 if i == j else 0.0
+            for k in range(joints):
+                gram[i, j] += jacobian[i, k] * jacobian[j, k]
     # One solve gives both parts: J^T G^-1 (twist - J drift) + drift.
-    velocities = jacobian.T @ np.linalg.solve(gram, twist - jacobian @ drift) + drift
-    excess = float(np.max(np.abs(velocities) / limits.speed))
-    if excess > 1.0:
-        velocities = velocities / excess
-    return np.clip(velocities, limit_gain * (limits.lower - joint_pos), limit_gain * (limits.upper - joint_pos))
+    _solve_in_place(gram, rest)
+    velocities = np.empty(joints)
+    excess = 1.0
+    for k in range(joints):
+        velocities[k] = posture_gain * (posture[k] - joint_pos[k])
+        for i in range(rows):
+            velocities[k] += jacobian[i, k] * rest[i]
+        excess = max(excess, abs(velocities[k]) / limits.speed[k])
+    for k in range(joints):
+        lowest, highest = limit_gain * (limits.lower[k] - joint_pos[k]), limit_gain * (limits.upper[k] - joint_pos[k])
+        velocities[k] = min(max(velocities[k] / excess, lowest), highest)
+    return velocities
+
+
+@njit(cache=True)
+def _solve_in_place(matrix: FloatArray, vector: FloatArray) -> None:
+    """Solve a symmetric positive definite system, of which the lower triangle is given, by Cholesky's method."""
+    size = len(vector)
+    for i in range(size):
+        for j in range(i + 1):
+            for k in range(j):
+                matrix[i, j] -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = np.sqrt(matrix[i, i]) if i == j else matrix[i, j] / matrix[j, j]
+        for k in range(i):
+            vector[i] -= matrix[i, k] * vector[k]
+        vector[i] /= matrix[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            vector[i] -= matrix[k, i] * vector[k]
+        vector[i] /= matrix[i, i]

@@ -38,7 +38,7 @@ def robot_hits_obstacle(model: Any, data: Any, owners: Owners) -> bool:
         return False
     pairs = owners[data.contact.geom]
     force = np.zeros(6)
-    for contact in np.flatnonzero((pairs.min(axis=1) == ROBOT) & (pairs.max(axis=1) == OBSTACLE)):
+    for contact in np.flatnonzero(pairs[:, 0] * pairs[:, 1] == ROBOT * OBSTACLE):
         mujoco.mj_contactForce(model, data, int(contact), force)
         if np.linalg.norm(force[:3]) > COLLISION_FORCE:
             return True

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from fixation_gym.control.computed_torque import ArmDynamics, ArmTask, arm_torques, camera_kinematics
 from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
 from fixation_gym.envs import contacts, scene_mjcf
 from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, ROBOT_BODIES, build_task
@@ -28,10 +29,6 @@ POSTURE = np.array([-0.3, 0.07, -0.35, -2.5, 1.1, 2.28, -1.5])
 """Joint angles, rad, from which the start pose is sought and towards which the arm's redundancy drifts."""
 JOINT_SPEED = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])
 """Franka's joint speed limits, rad/s."""
-_VELOCITY_GAIN, _POSITION_GAIN = 40.0, 400.0
-"""Error dynamics of the joint controller, 1/s and 1/s^2: critically damped at 20 rad/s."""
-_MAX_WINDUP = 0.05
-"""Largest lead of the integrated joint command over the joint, rad."""
 _GRIPPER_SPEED = 0.10
 """Closing speed of one finger, m/s."""
 
@@ -57,14 +54,15 @@ class PickSim:
         task = build_task(control_frequency)
         self.model: Any = task.sim.model._model
         self.data: Any = task.sim.data._data
-        self._task = task  # owns model and data
+        self._robosuite_task = task  # owns model and data
         model = self.model
         mirror = model.mat("mirror_glass").id
         model.mat_reflectance[np.arange(model.nmat) != mirror] = 0.0
         # Pool shapes are resized at reset, the mid-phase's bounding trees are not.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+        # Parked and resting objects sleep until something touches them.
+        model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
         self.substeps = round(1.0 / (control_frequency * model.opt.timestep))
-        self._loader = SceneLoader(model)
         self._hand = model.body(HAND_BODY).id
         base = model.body(BASE_BODY).id
         mujoco.mj_kinematics(model, self.data)
@@ -73,11 +71,17 @@ class PickSim:
         self._arm = slice(0, 7)
         self._fingers = slice(7, 9)
         limits = model.jnt_range[:7]
-        self.joint_limits = JointLimits(limits[:, 0] + 0.02, limits[:, 1] - 0.02, JOINT_SPEED)
+        self._task = ArmTask(
+            HAND_EYE,
+            POSTURE,
+            JointLimits(limits[:, 0] + 0.02, limits[:, 1] - 0.02, JOINT_SPEED),
+            model.actuator_ctrlrange[:7].copy(),
+            model.opt.timestep,
+        )
+        self._arm_dynamics = self._view_arm()
         self._geom_owner = contacts.geom_owners(model, ROBOT_BODIES)
         self._group_robot_geoms()
-        self._mass = np.zeros((model.nv, model.nv))
-        self._jacobian = np.zeros((6, model.nv))
+        self._loader = SceneLoader(model)  # every load restores the groups as they are now
         self._joint_command = np.zeros(7)
         self.obstacles: tuple[str, ...] = ()
 
@@ -90,6 +94,22 @@ class PickSim:
             else:
                 model.geom_group[geom] = scene_mjcf.STAND_IN_GROUP
                 model.geom_rgba[geom] = (0.85, 0.86, 0.88, 1.0)
+
+    def _view_arm(self) -> ArmDynamics:
+        """Views into the simulator's arrays; the arm's joints are the first of the model and form one chain."""
+        model, data = self.model, self.data
+        assert np.array_equal(model.dof_parentid[:7], np.arange(-1, 6)), "mass matrix is read as that of a chain"
+        return ArmDynamics(
+            joint_pos=data.qpos[:7],
+            joint_vel=data.qvel[:7],
+            anchors=data.xanchor[:7],
+            axes=data.xaxis[:7],
+            hand_position=data.xpos[self._hand],
+            hand_rotation=data.xmat[self._hand].reshape(3, 3),
+            mass=data.qM[:28],
+            bias=data.qfrc_bias[:7],
+            passive=data.qfrc_passive[:7],
+        )
 
     # -- reset and step ------------------------------------------------------------------------------------------
 
@@ -111,7 +131,7 @@ class PickSim:
         self.obstacles = tuple(body for body in placed if body != "target")
         start = look_at(np.array(scene.camera_position), np.array(scene.gaze_point), np.array([0.0, 0.0, 1.0]))
         data.qpos[self._fingers] = data.ctrl[7:9] = [0.04, -0.04]
-        data.qpos[self._arm] = self._joint_command = self._inverse_kinematics(start)
+        data.qpos[self._arm] = self._joint_command[:] = self._inverse_kinematics(start)
         mujoco.mj_forward(model, data)
         self._rest = {body: self.body_position(body) for body in placed}
 
@@ -128,8 +148,8 @@ class PickSim:
             error = np.concatenate([offset, turn])
             if np.linalg.norm(error) < 1e-6:
                 return joints
-            step = joint_velocities(state.jacobian, error, joints, POSTURE, self.joint_limits, posture_gain=0.1)
-            joints = np.clip(joints + step, self.joint_limits.lower, self.joint_limits.upper)
+            step = joint_velocities(state.jacobian, error, joints, POSTURE, self._task.limits, posture_gain=0.1)
+            joints = np.clip(joints + step, self._task.limits.lower, self._task.limits.upper)
         if np.linalg.norm(error) > 2e-3:
             raise RuntimeError(f"the arm cannot reach the camera pose at {np.round(T_base_cam[:3, 3], 3).tolist()}")
         return joints
@@ -146,52 +166,34 @@ class PickSim:
             qpos at the exposure, and whether the robot hit an obstacle.
         """
         model, data = self.model, self.data
-        finger_step = _GRIPPER_SPEED * model.opt.timestep * np.sign(gripper)
+        finger_step = _GRIPPER_SPEED * model.opt.timestep * float(np.sign(gripper))
+        arm, torques, fingers = self._arm_dynamics, data.ctrl[self._arm], data.ctrl[self._fingers]
+        finger = float(fingers[0])
         collided = False
         exposed = data.qpos.copy()
         for substep in range(1, self.substeps + 1):
             mujoco.mj_step1(model, data)
-            data.ctrl[self._arm] = self._torques(camera_twist)
-            data.ctrl[7] = np.clip(data.ctrl[7] - finger_step, 0.0, 0.04)
-            data.ctrl[8] = -data.ctrl[7]
+            arm_torques(arm, self._task, camera_twist, self._joint_command, torques)
+            finger = min(max(finger - finger_step, 0.0), 0.04)
+            fingers[:] = finger, -finger
             mujoco.mj_step2(model, data)
-            collided = collided or contacts.robot_hits_obstacle(model, data, self._geom_owner)
+            if self.obstacles and not collided:
+                collided = contacts.robot_hits_obstacle(model, data, self._geom_owner)
             if substep == exposure_substep:
                 exposed = data.qpos.copy()
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         return exposed, collided
 
-    def _torques(self, camera_twist: FloatArray) -> FloatArray:
-        """Computed-torque joint velocity control with an integrated position reference, N m."""
-        model, data = self.model, self.data
-        state = self.arm_state()
-        velocity = joint_velocities(state.jacobian, camera_twist, state.joint_pos, POSTURE, self.joint_limits)
-        lead = self._joint_command + velocity * model.opt.timestep - state.joint_pos
-        self._joint_command = state.joint_pos + np.clip(lead, -_MAX_WINDUP, _MAX_WINDUP)
-        mujoco.mj_fullM(model, self._mass, data.qM)
-        acceleration = _VELOCITY_GAIN * (velocity - state.joint_vel) + _POSITION_GAIN * (
-            self._joint_command - state.joint_pos
-        )
-        torque = self._mass[:7, :7] @ acceleration + data.qfrc_bias[:7] - data.qfrc_passive[:7]
-        return np.clip(torque, model.actuator_ctrlrange[:7, 0], model.actuator_ctrlrange[:7, 1])
-
     # -- truth ---------------------------------------------------------------------------------------------------
 
     def arm_state(self) -> ArmState:
         """State of the arm as the last kinematics computed it."""
-        model, data = self.model, self.data
-        jacobian = self._jacobian
-        hand_rotation = data.xmat[self._hand].reshape(3, 3)
-        rotation = hand_rotation @ HAND_EYE[:3, :3]
-        position = data.xpos[self._hand] + hand_rotation @ HAND_EYE[:3, 3]
-        mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], position, self._hand)
-        pose = np.eye(4)
-        pose[:3, :3] = rotation
-        pose[:3, 3] = position - self._base_position
-        in_camera = np.concatenate([rotation.T @ jacobian[:3, :7], rotation.T @ jacobian[3:, :7]])
-        width = float(data.qpos[7] - data.qpos[8])
-        return ArmState(data.qpos[:7].copy(), data.qvel[:7].copy(), pose, in_camera, width)
+        arm = self._arm_dynamics
+        pose, jacobian = camera_kinematics(arm, HAND_EYE)
+        pose[:3, 3] -= self._base_position
+        width = float(self.data.qpos[7] - self.data.qpos[8])
+        return ArmState(arm.joint_pos.copy(), arm.joint_vel.copy(), pose, jacobian, width)
 
     def body_position(self, body: str) -> FloatArray:
         """Centre of a pool body in base, shape (3,), m."""

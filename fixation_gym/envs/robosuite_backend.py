@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import xml.etree.ElementTree as ET
 from typing import Any
 
 from fixation_gym.envs import scene_mjcf
@@ -42,6 +43,7 @@ class _FixationPickTask(ManipulationEnv):
         scene_mjcf.add_wrist_camera(hand)
         scene_mjcf.add_object_pool(worldbody)
         scene_mjcf.add_background(worldbody, _TABLE_OFFSET)
+        ET.SubElement(self.model.contact, "exclude", {"body1": BASE_BODY, "body2": "robot0_link1"})
 
     def reward(self, action: Any = None) -> float:
         """Rewards are the business of the Gymnasium environment."""
