@@ -58,7 +58,7 @@ class ArmTask(NamedTuple):
 
 @njit(cache=True)
 def camera_kinematics(arm: ArmDynamics, hand_eye: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Camera pose T_world_cam, shape (4, 4), and camera twist, expressed in ``cam``, per joint velocity, shape (6, n)."""
+    """Camera pose T_world_cam, shape (4, 4), and its twist, expressed in ``cam``, per joint velocity, shape (6, n)."""
     pose = np.zeros((4, 4))
     pose[3, 3] = 1.0
     pose[:3, 3] = arm.hand_position

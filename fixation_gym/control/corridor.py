@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from fixation_gym.robot import TOOL_IN_CAMERA
 from fixation_gym.types import FloatArray, MaskArray
@@ -49,13 +50,6 @@ class Box:
     half_extent: FloatArray
     yaw: float
 
-    def surface_points(self, spacing: float = 0.02) -> FloatArray:
-        """Points in the box, shape (n, 3), m; ``spacing`` is below the thickness of the fingers."""
-        axes = [np.linspace(-h, h, max(2, int(np.ceil(2.0 * h / spacing)) + 1)) for h in self.half_extent]
-        local = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
-        return local @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + self.centre
-
 
 def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
     """Unit vectors from target to camera for every pair of angles, shape (n, 3), in base.
@@ -80,15 +74,12 @@ def free_directions(target: FloatArray, obstacles: list[Box], directions: FloatA
     """
     if not obstacles:
         return np.ones(len(directions), dtype=bool)
-    points = np.concatenate([box.surface_points() for box in obstacles]) - target
-    forward = -directions
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right, axis=-1, keepdims=True)
-    down = np.cross(forward, right)
-    axes = np.stack([right, down, forward], axis=1)
-    local = (points @ axes.reshape(-1, 3).T).reshape(len(points), len(directions), 3)
-    hit = in_corridor(local, margin)
-    return np.asarray(~np.any(hit, axis=0))
+    axes = _camera_axes(directions)
+    turns = np.stack([_yaw_matrix(box.yaw) for box in obstacles])
+    rotations = axes[:, None] @ turns  # of every box in every camera
+    offsets = (np.stack([box.centre for box in obstacles]) - target) @ axes.transpose(0, 2, 1)
+    halves = np.stack([box.half_extent for box in obstacles])
+    return np.asarray(~_any_meets(rotations, offsets, halves, *_centre_and_half(margin)))
 
 
 def in_corridor(points: FloatArray, margin: float) -> MaskArray:
@@ -101,11 +92,75 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
     Returns:
         Mask of shape (...).
     """
-    hit: MaskArray = np.zeros(points.shape[:-1], dtype=np.bool_)
-    x, y, z = (np.ascontiguousarray(points[..., i]) for i in range(3))
-    for low, high in zip(_BOXES[:, 0] - margin, _BOXES[:, 1] + margin, strict=True):
-        inside = (x > low[0]) & (x < high[0])
-        inside &= (y > low[1]) & (y < high[1])
-        inside &= (z > low[2]) & (z < high[2])
-        np.logical_or(hit, inside, out=hit)
+    flat = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+    return np.asarray(_any_holds(flat, *_centre_and_half(margin)).reshape(points.shape[:-1]))
+
+
+def _centre_and_half(margin: float) -> tuple[FloatArray, FloatArray]:
+    """Centres and half sizes of the swept boxes, widened by a margin; each of shape (n, 3), m."""
+    return 0.5 * (_BOXES[:, 0] + _BOXES[:, 1]), 0.5 * (_BOXES[:, 1] - _BOXES[:, 0]) + margin
+
+
+def _camera_axes(directions: FloatArray) -> FloatArray:
+    """Rows x (right), y (down), z (forward) of level cameras that look against the directions, shape (n, 3, 3)."""
+    x, y, z = -directions.T
+    length = np.hypot(x, y)
+    right_x, right_y = y / length, -x / length  # forward x up
+    down = (-z * right_y, z * right_x, x * right_y - y * right_x)  # forward x right
+    rows = (right_x, right_y, np.zeros_like(x), *down, x, y, z)
+    return np.stack(rows, axis=1).reshape(-1, 3, 3)
+
+
+def _yaw_matrix(yaw: float) -> FloatArray:
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@njit(cache=True)
+def _any_holds(points: FloatArray, centres: FloatArray, halves: FloatArray) -> MaskArray:
+    """Which points, shape (n, 3), are inside one of the aligned boxes."""
+    inside = np.zeros(len(points), np.bool_)
+    for i in range(len(points)):
+        for box in range(len(centres)):
+            held = True
+            for axis in range(3):
+                held &= abs(points[i, axis] - centres[box, axis]) < halves[box, axis]
+            if held:
+                inside[i] = True
+                break
+    return inside
+
+
+@njit(cache=True)
+def _any_meets(
+    rotations: FloatArray, offsets: FloatArray, turned_halves: FloatArray, centres: FloatArray, halves: FloatArray
+) -> MaskArray:
+    """For each of n cameras, whether a turned box, (n, m, 3, 3) and (n, m, 3), meets one of the aligned ones."""
+    hit = np.zeros(len(offsets), np.bool_)
+    for camera in range(len(offsets)):
+        for i in range(len(turned_halves)):
+            for box in range(len(centres)):
+                offset = offsets[camera, i] - centres[box]
+                if not hit[camera]:
+                    hit[camera] = _boxes_meet(offset, rotations[camera, i], turned_halves[i], halves[box])
     return hit
+
+
+@njit(cache=True)
+def _boxes_meet(offset: FloatArray, rotation: FloatArray, turned: FloatArray, half: FloatArray) -> bool:
+    """Whether a box turned by ``rotation`` at ``offset`` meets an aligned one at 0 (separating axes, Gottschalk)."""
+    size = np.abs(rotation) + 1e-9  # parallel edges have no cross product
+    for i in range(3):
+        if abs(offset[i]) > half[i] + size[i, 0] * turned[0] + size[i, 1] * turned[1] + size[i, 2] * turned[2]:
+            return False
+        along = offset[0] * rotation[0, i] + offset[1] * rotation[1, i] + offset[2] * rotation[2, i]
+        if abs(along) > turned[i] + size[0, i] * half[0] + size[1, i] * half[1] + size[2, i] * half[2]:
+            return False
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        for j in range(3):
+            c, d = (j + 1) % 3, (j + 2) % 3
+            reach = half[a] * size[b, j] + half[b] * size[a, j] + turned[c] * size[i, d] + turned[d] * size[i, c]
+            if abs(offset[b] * rotation[a, j] - offset[a] * rotation[b, j]) > reach:
+                return False
+    return True

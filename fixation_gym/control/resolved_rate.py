@@ -12,6 +12,13 @@ from numba import njit
 
 from fixation_gym.types import FloatArray
 
+DAMPING = 0.01
+"""Of the least squares: bounds joint speeds near singular postures."""
+POSTURE_GAIN = 0.5
+"""Rate of the null-space drift, 1/s."""
+LIMIT_GAIN = 5.0
+"""A joint nears its limit no faster than this rate times the remaining angle, 1/s."""
+
 
 class JointLimits(NamedTuple):
     """Limits of the arm, each of shape (n,)."""
@@ -31,9 +38,9 @@ def joint_velocities(
     joint_pos: FloatArray,
     posture: FloatArray,
     limits: JointLimits,
-    damping: float = 0.01,
-    posture_gain: float = 0.5,
-    limit_gain: float = 5.0,
+    damping: float = DAMPING,
+    posture_gain: float = POSTURE_GAIN,
+    limit_gain: float = LIMIT_GAIN,
 ) -> FloatArray:
     """Joint velocities whose camera twist is nearest to ``twist``.
 

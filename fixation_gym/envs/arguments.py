@@ -8,16 +8,20 @@ import numpy as np
 from gymnasium import spaces
 
 
-def checked_image_size(image_size: Any) -> tuple[int, int]:
-    """Return (height, width) as plain integers.
+def checked_image_size(image_size: Any) -> tuple[int, int] | None:
+    """Return (height, width) as plain integers, or None.
 
     Raises:
-        ValueError: if it is not two whole numbers within 32..2048.
+        ValueError: if it is neither None nor two whole numbers within 32..2048.
     """
+    if image_size is None:
+        return None
     sizes = tuple(image_size) if isinstance(image_size, (tuple, list)) else ()
     whole = all(isinstance(size, (int, np.integer)) and not isinstance(size, bool) for size in sizes)
     if len(sizes) != 2 or not whole or not all(32 <= size <= 2048 for size in sizes):
-        raise ValueError(f"image_size must be (height, width), two whole numbers within 32..2048, got {image_size!r}")
+        raise ValueError(
+            f"image_size must be None or (height, width), two whole numbers within 32..2048, got {image_size!r}"
+        )
     return int(sizes[0]), int(sizes[1])
 
 
@@ -31,16 +35,17 @@ def require_choice(name: str, value: str | None, allowed: tuple[str | None, ...]
         raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
 
 
-def observation_space(height: int, width: int) -> spaces.Dict:
-    """Observation space of ``FixationPick-v0`` for a wrist image of that size; units as in its table."""
+def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
+    """Observation space of ``FixationPick-v0`` with a wrist image of that size, or without; units as in its table."""
 
     def box(*bounds: float) -> spaces.Box:
         high = np.array(bounds, dtype=np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
+    image = {} if image_size is None else {"rgb": spaces.Box(0, 255, (*image_size, 3), np.uint8)}
     return spaces.Dict(
-        {
-            "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
+        image
+        | {
             "joint_pos": box(*[4.0] * 7),
             "joint_vel": box(*[10.0] * 7),
             "gripper_width": spaces.Box(0.0, 0.1, (1,), np.float32),

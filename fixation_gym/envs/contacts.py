@@ -8,6 +8,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from fixation_gym.envs.config import COLLISION_FORCE
@@ -36,11 +37,22 @@ def robot_hits_obstacle(model: Any, data: Any, owners: Owners) -> bool:
     """Whether a robot-obstacle contact carries more than ``COLLISION_FORCE``."""
     if data.ncon == 0:
         return False
-    pairs = owners[data.contact.geom]
+    geoms = data.contact.geom
+    if not _any_touch(geoms, owners):
+        return False
     force = np.zeros(6)
-    for contact in np.flatnonzero(pairs[:, 0] * pairs[:, 1] == ROBOT * OBSTACLE):
+    for contact in np.flatnonzero(owners[geoms].prod(axis=1) == ROBOT * OBSTACLE):
         mujoco.mj_contactForce(model, data, int(contact), force)
         if np.linalg.norm(force[:3]) > COLLISION_FORCE:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _any_touch(geoms: Owners, owners: Owners) -> bool:
+    """Whether one of the pairs of geoms, shape (n, 2), is of robot and obstacle; asked at every physics substep."""
+    for pair in range(len(geoms)):  # noqa: SIM110 - compiled
+        if owners[geoms[pair, 0]] * owners[geoms[pair, 1]] == ROBOT * OBSTACLE:
             return True
     return False
 

@@ -68,7 +68,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     def __init__(
         self,
         scenario: str | Mapping[str, Any] = "clear",
-        image_size: tuple[int, int] = config.IMAGE_SIZE,
+        image_size: tuple[int, int] | None = config.IMAGE_SIZE,
         sensor_noise: str = "nominal",
         control_frequency: int = config.CONTROL_FREQUENCY,
         render_mode: str | None = None,
@@ -79,7 +79,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
 
         Args:
             scenario: name from ``config.SCENARIO_NAMES`` or a mapping of ``config.Scenario`` fields.
-            image_size: (height, width) of the wrist image, px.
+            image_size: (height, width) of the wrist image, px; None for observations without ``rgb``.
             sensor_noise: "ideal", "nominal" or "conservative".
             control_frequency: steps per second: 10, 20, 25, 50 or 100.
             render_mode: None, "rgb_array" or "human" (MuJoCo's viewer; needs a display).
@@ -91,20 +91,22 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         """
         self.scenario = config.resolve_scenario(scenario)
         self.noise = config.resolve_sensor_noise(sensor_noise)
-        height, width = checked_image_size(image_size)
+        self._image_size = checked_image_size(image_size)
         if control_frequency not in (10, 20, 25, 50, 100):
             raise ValueError(f"control_frequency must be 10, 20, 25, 50 or 100 Hz, got {control_frequency!r}")
         require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
         require_choice("render_view", render_view, RENDER_VIEWS)
+        if self._image_size is None and render_view == "overlay":
+            raise ValueError('render_view="overlay" shows what perception sees, so it needs an image_size')
         require_choice("reward", reward, rewards.REWARDS)
         self.render_mode, self.render_view = render_mode, render_view
         self.metadata = self.metadata | {"render_fps": control_frequency}
-        self.intrinsics = Intrinsics.from_fovy(height, width, CAMERA_FOVY)
+        self.intrinsics = Intrinsics.from_fovy(*(self._image_size or config.IMAGE_SIZE), CAMERA_FOVY)
         self.hand_eye = HAND_EYE
         self.control_frequency = control_frequency
         self._reward_terms = rewards.dense_terms if reward == "dense" else rewards.sparse_terms
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
-        self.observation_space = observation_space(height, width)
+        self.observation_space = observation_space(self._image_size)
         self._sim: PickSim | None = None
         self._views: dict[str, View] = {}
         self._window: Window | None = None
@@ -211,8 +213,11 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
 
     def _observe(self, exposed_qpos: FloatArray) -> dict[str, Any]:
         state = self.sim.arm_state()
-        image = self._image("observation", exposed_qpos)
-        self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self.np_random)
+        observation: dict[str, Any] = {}
+        if self._image_size is not None:
+            image = self._image("observation", exposed_qpos)
+            self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self.np_random)
+            observation["rgb"] = self._last_rgb.copy()
         joint_pos, joint_vel = sensors.measure_joints(state.joint_pos, state.joint_vel, self.noise, self.np_random)
         pose = sensors.measure_camera_pose(
             state.camera_pose, state.jacobian, joint_pos - state.joint_pos, self._errors.hand_eye
@@ -222,10 +227,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             "joint_vel": joint_vel,
             "gripper_width": [state.gripper_width],
             "camera_pose": matrix_to_pose(pose),
-            "camera_twist": sensors.measure_camera_twist(state.jacobian, joint_vel, self._errors.hand_eye),
+            "camera_twist": sensors.measure_camera_twist(state.jacobian, joint_vel, self._errors),
             "time": [self._steps / self.control_frequency],
         }
-        observation: dict[str, Any] = {"rgb": self._last_rgb.copy()}
         for key, value in vectors.items():
             space = self.observation_space[key]  # pyright: ignore[reportIndexIssue]
             observation[key] = np.clip(np.asarray(value), space.low, space.high).astype(np.float32)

@@ -13,7 +13,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from fixation_gym.control.computed_torque import ArmDynamics, ArmTask, arm_torques, camera_kinematics
 from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
@@ -80,13 +79,13 @@ class PickSim:
         )
         self._arm_dynamics = self._view_arm()
         self._geom_owner = contacts.geom_owners(model, ROBOT_BODIES)
-        self._group_robot_geoms()
+        self._group_geoms()
         self._loader = SceneLoader(model)  # every load restores the groups as they are now
         self._joint_command = np.zeros(7)
         self.obstacles: tuple[str, ...] = ()
 
-    def _group_robot_geoms(self) -> None:
-        """Sort the robot's geoms into its looks (182,000 faces) and their low-poly stand-ins, the collision shapes."""
+    def _group_geoms(self) -> None:
+        """Tell the robot's looks (182,000 faces) from their low-poly stand-ins, the collision shapes."""
         model = self.model
         for geom in np.flatnonzero(self._geom_owner == contacts.ROBOT):
             if model.geom_group[geom] == scene_mjcf.VISIBLE_GROUP:
@@ -94,6 +93,8 @@ class PickSim:
             else:
                 model.geom_group[geom] = scene_mjcf.STAND_IN_GROUP
                 model.geom_rgba[geom] = (0.85, 0.86, 0.88, 1.0)
+        for leg in range(1, 5):  # under the table, from where neither wrist camera nor mirror can see them
+            model.geom(f"table_leg{leg}_visual").group = scene_mjcf.ROBOT_GROUP
 
     def _view_arm(self) -> ArmDynamics:
         """Views into the simulator's arrays; the arm's joints are the first of the model and form one chain."""
@@ -137,19 +138,22 @@ class PickSim:
 
     def _inverse_kinematics(self, T_base_cam: FloatArray) -> FloatArray:
         """Joint angles that bring the camera to a pose."""
+        limits = self._task.limits
         joints, error = POSTURE.copy(), np.full(6, np.inf)
-        for _ in range(100):
+        for iteration in range(100):
             self.data.qpos[self._arm] = joints
             mujoco.mj_kinematics(self.model, self.data)
-            mujoco.mj_comPos(self.model, self.data)
             state = self.arm_state()
             offset = state.camera_pose[:3, :3].T @ (T_base_cam[:3, 3] - state.camera_pose[:3, 3])
-            turn = Rotation.from_matrix(state.camera_pose[:3, :3].T @ T_base_cam[:3, :3]).as_rotvec()
-            error = np.concatenate([offset, turn])
+            turn = state.camera_pose[:3, :3].T @ T_base_cam[:3, :3]
+            # Axis times the sine of the angle: right to first order, which is what the iteration needs.
+            sine = 0.5 * (turn - turn.T)
+            error = np.array([*offset, sine[2, 1], sine[0, 2], sine[1, 0]])
             if np.linalg.norm(error) < 1e-6:
                 return joints
-            step = joint_velocities(state.jacobian, error, joints, POSTURE, self._task.limits, posture_gain=0.1)
-            joints = np.clip(joints + step, self._task.limits.lower, self._task.limits.upper)
+            posture_gain = 0.5 if iteration < 6 else 0.0  # the drift slows the convergence that then follows
+            step = joint_velocities(state.jacobian, error, joints, POSTURE, limits, 1e-3, posture_gain, 1.0)
+            joints = np.clip(joints + step, limits.lower, limits.upper)
         if np.linalg.norm(error) > 2e-3:
             raise RuntimeError(f"the arm cannot reach the camera pose at {np.round(T_base_cam[:3, 3], 3).tolist()}")
         return joints

@@ -43,6 +43,7 @@ class _FixationPickTask(ManipulationEnv):
         scene_mjcf.add_wrist_camera(hand)
         scene_mjcf.add_object_pool(worldbody)
         scene_mjcf.add_background(worldbody, _TABLE_OFFSET)
+        scene_mjcf.draw_last(worldbody, ("floor", "wall", "board"))
         ET.SubElement(self.model.contact, "exclude", {"body1": BASE_BODY, "body2": "robot0_link1"})
 
     def reward(self, action: Any = None) -> float:

@@ -107,10 +107,10 @@ def _propose(scenario: Scenario, rng: np.random.Generator) -> SceneSpec | None:
             return None
         obstacles.append(obstacle)
     boxes = [obstacle.box for obstacle in obstacles]
+    if free_directions(centre, boxes, reachable_directions(centre), _CLEARANCE).mean() < _LEAST_FREE:
+        return None
     start = (camera - centre) / np.linalg.norm(camera - centre)
     if boxes and free_directions(centre, boxes, start[None], 0.0)[0]:
-        return None
-    if free_directions(centre, boxes, reachable_directions(centre), _CLEARANCE).mean() < _LEAST_FREE:
         return None
     light = rng.uniform(-0.5, 0.5, 2)
     return SceneSpec(

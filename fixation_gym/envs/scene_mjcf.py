@@ -141,6 +141,18 @@ def add_background(worldbody: ET.Element, table_top: tuple[float, float, float])
     ET.SubElement(worldbody, "camera", front | {"pos": f"{x + 1.05} {y - 0.75} {z + 0.65}", "xyaxes": _FRONT_AXES})
 
 
+def draw_last(worldbody: ET.Element, beginnings: tuple[str, ...]) -> None:
+    """Move the world's geoms with these beginnings of their names into a last body.
+
+    MuJoCo draws by order in the model; what is hidden behind things already drawn costs nothing.
+    """
+    room = ET.SubElement(worldbody, "body", {"name": "room"})
+    for geom in worldbody.findall("geom"):
+        if geom.get("name", "").startswith(beginnings):
+            worldbody.remove(geom)
+            room.append(geom)
+
+
 _FRONT_AXES = "0.58 0.81 0 -0.36 0.26 0.90"
 
 

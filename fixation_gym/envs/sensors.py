@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from fixation_gym.envs.config import SensorNoise
 from fixation_gym.geometry.rigid import inverse
-from fixation_gym.geometry.twist import adjoint
+from fixation_gym.geometry.twist import adjoint, skew
 from fixation_gym.types import FloatArray, ImageArray
 
 
@@ -19,6 +19,8 @@ class EpisodeErrors:
 
     hand_eye: FloatArray
     """Small motion [translation in m, rotation vector in rad] from the true to the believed camera frame, (6,)."""
+    believed_from_true: FloatArray
+    """Matrix, shape (6, 6), that turns a twist of the true camera frame into the believed one's."""
     exposure: float
     """Factor on every grey level."""
 
@@ -27,7 +29,11 @@ def draw_episode_errors(noise: SensorNoise, rng: np.random.Generator) -> Episode
     """Draw the calibration errors of one episode."""
     scale = np.repeat([noise.hand_eye_m, noise.hand_eye_rad], 3)
     exposure = 1.0 + noise.exposure_gain * rng.standard_normal()
-    return EpisodeErrors(rng.standard_normal(6) * scale, float(max(0.2, exposure)))
+    hand_eye = rng.standard_normal(6) * scale
+    T_true_believed = np.eye(4)
+    T_true_believed[:3, :3] = _small_rotation(hand_eye[3:])
+    T_true_believed[:3, 3] = hand_eye[:3]
+    return EpisodeErrors(hand_eye, adjoint(inverse(T_true_believed)), float(max(0.2, exposure)))
 
 
 def measure_joints(
@@ -50,25 +56,29 @@ def measure_camera_pose(
     motion = jacobian @ joint_error + hand_eye
     pose = np.array(T_base_cam)
     pose[:3, 3] += T_base_cam[:3, :3] @ motion[:3]
-    pose[:3, :3] = T_base_cam[:3, :3] @ Rotation.from_rotvec(motion[3:]).as_matrix()
+    pose[:3, :3] = T_base_cam[:3, :3] @ _small_rotation(motion[3:])
     return pose
 
 
-def measure_camera_twist(jacobian: FloatArray, joint_vel: FloatArray, hand_eye: FloatArray) -> FloatArray:
+def measure_camera_twist(jacobian: FloatArray, joint_vel: FloatArray, errors: EpisodeErrors) -> FloatArray:
     """Twist [v, w], shape (6,), that kinematics gives in the camera frame as the hand-eye calibration believes it."""
-    T_true_believed = np.eye(4)
-    T_true_believed[:3, :3] = Rotation.from_rotvec(hand_eye[3:]).as_matrix()
-    T_true_believed[:3, 3] = hand_eye[:3]
-    return adjoint(inverse(T_true_believed)) @ (jacobian @ joint_vel)
+    return errors.believed_from_true @ (jacobian @ joint_vel)
+
+
+def _small_rotation(vector: FloatArray) -> FloatArray:
+    """Rotation matrix of a rotation vector of some mrad, to second order."""
+    hat = skew(vector)
+    return np.eye(3) + hat + 0.5 * hat @ hat
 
 
 def measure_image(image: ImageArray, noise: SensorNoise, exposure: float, rng: np.random.Generator) -> ImageArray:
     """Camera image with exposure error, read noise and shot noise, shape (H, W, 3), uint8."""
     if noise.read_noise == 0.0 and noise.shot_noise == 0.0 and exposure == 1.0:
         return image
-    signal = image.astype(np.float32)
-    signal *= np.float32(exposure)
-    deviation = np.sqrt(noise.read_noise**2 + noise.shot_noise * signal)
-    signal += deviation * rng.standard_normal(image.shape, dtype=np.float32)
-    np.rint(signal, out=signal)
-    return np.clip(signal, 0.0, 255.0, out=signal).astype(np.uint8)
+    # Mean and standard deviation depend on the grey level alone: two tables of 256 entries.
+    signal = np.arange(256, dtype=np.float32) * np.float32(exposure)
+    deviation = np.sqrt(np.float32(noise.read_noise**2) + np.float32(noise.shot_noise) * signal)
+    noisy = rng.standard_normal(image.shape, dtype=np.float32)
+    np.multiply(noisy, cv2.LUT(image, deviation), out=noisy)
+    # Stored as uint8, the sum is rounded and clipped to 0..255.
+    return np.asarray(cv2.add(noisy, cv2.LUT(image, signal), dtype=cv2.CV_8U), np.uint8)

@@ -8,10 +8,23 @@ ABOVE = np.array([[0.0, 1e-6, 1.0]])
 TARGET = np.array([0.5, 0.0, 0.0])
 
 
-def test_box_points_lie_in_the_turned_box():
-    box = Box(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.02, 0.05]), np.pi / 2)
-    points = box.surface_points() - box.centre
-    assert np.max(np.abs(points), axis=0) == pytest.approx([0.02, 0.1, 0.05])
+def test_free_directions_agree_with_points_spread_through_the_boxes():
+    rng = np.random.default_rng(0)
+    directions = approach_directions(np.radians(np.linspace(-60, 60, 7)), np.radians([30.0, 50.0, 70.0]))
+    for _ in range(20):
+        box = Box(TARGET + rng.uniform(-0.2, 0.2, 3), rng.uniform(0.02, 0.1, 3), rng.uniform(-np.pi, np.pi))
+        local = rng.uniform(-1, 1, (4000, 3)) * box.half_extent
+        c, s = np.cos(box.yaw), np.sin(box.yaw)
+        points = local @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + box.centre - TARGET
+        touched = []
+        for direction in directions:
+            right = np.cross(-direction, [0, 0, 1]) / np.linalg.norm(np.cross(-direction, [0, 0, 1]))
+            axes = np.stack([right, np.cross(-direction, right), -direction])
+            touched.append(in_corridor(points @ axes.T, 0.0).any())
+        touched = np.array(touched)
+        # Points may miss a corner: with some margin more or less, boxes and points must agree.
+        assert not np.any(touched & free_directions(TARGET, [box], directions, 0.0))
+        assert not np.any(~touched & ~free_directions(TARGET, [box], directions, -0.01))
 
 
 def test_directions_are_unit_vectors_that_rise_with_elevation():
