@@ -108,6 +108,28 @@ class Evaluate:
 
 
 @dataclass(frozen=True)
+class Bench:
+    """Time every stage and comparable environments in one run: table of medians, ratios and a bar chart."""
+
+    quick: bool = False
+    """Fewer rounds, without worker processes and memory run."""
+    out: Path = Path("out/bench")
+    """Folder of the results; earlier ones there are replaced."""
+
+    def run(self) -> int:
+        """Measure and print the table."""
+        select_backend()
+        from fixation_gym.evaluation.storage import make_folder
+
+        make_folder(self.out)
+        from fixation_gym.experiments.bench import FIGURE_FILE, bench, format_table
+
+        print(format_table(bench(self.quick, self.out)))
+        print(f"\n{self.out / FIGURE_FILE}")
+        return 0
+
+
+@dataclass(frozen=True)
 class Doctor:
     """Check the installation: versions, GL backend, OpenCV, one rendered frame."""
 
@@ -133,6 +155,7 @@ class Doctor:
 Commands = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
 

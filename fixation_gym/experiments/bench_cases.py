@@ -1,0 +1,190 @@
+"""What the benchmark times: our environment, its perception and policy, and the peers that are installed."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import gymnasium as gym
+import numpy as np
+
+import fixation_gym  # noqa: F401 - registers the environments
+from fixation_gym.envs.config import CONTROL_FREQUENCY
+from fixation_gym.envs.scene import TABLE_HEIGHT
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.types import Observation
+from policies.servo.servo_policy import ServoPolicy
+
+Size = tuple[int, int]
+"""(height, width), px."""
+STEP_SIZES: tuple[Size, ...] = ((84, 84), (128, 128), (240, 320), (480, 640))
+PERCEPTION_SIZES: tuple[Size, ...] = ((128, 128), (240, 320), (480, 640))
+_FRAMES = 30
+_ENDLESS = 10**9
+
+
+@dataclass(frozen=True)
+class Case:
+    """One thing to time: ``run`` does it once."""
+
+    name: str
+    run: Callable[[], Any]
+    close: Callable[[], Any] = lambda: None
+
+
+def all_cases() -> list[Case]:
+    """Every case that can run here, built and ready."""
+    return [*environment_cases(), *perception_cases(), *peer_cases()]
+
+
+def label(size: Size) -> str:
+    """Width x height, as people write it."""
+    return f"{size[1]}x{size[0]}"
+
+
+def environment_cases() -> Iterator[Case]:
+    """Step and reset of ``FixationPick-v0`` in scenario ``opaque``."""
+    sizes: list[Size | None] = [None, *STEP_SIZES]
+    for size in sizes:
+        env = gym.make("FixationPick-v0", scenario="opaque", image_size=size, max_episode_steps=_ENDLESS)
+        env.reset(seed=0)
+        suffix = "without image" if size is None else label(size)
+        yield Case(f"step {suffix}", _stepper(env), env.close)
+        if size in (None, (128, 128)):
+            yield Case(f"reset {suffix}", env.reset)
+
+
+def perception_cases() -> Iterator[Case]:
+    """Perception and policy on a recorded approach, and OpenCV's dense flows on the same images."""
+    for size in PERCEPTION_SIZES:
+        recorded = record_approach(size)
+        observations = [Observation.from_dict(observation) for observation in recorded]
+        yield Case(
+            f"perception {label(size)}", _replay(Perception(_camera(size), support_height_m=TABLE_HEIGHT), observations)
+        )
+        yield Case(f"ServoPolicy.act {label(size)}", _act(size, recorded))
+        greys = [cv2.cvtColor(observation.rgb, cv2.COLOR_RGB2GRAY) for observation in observations]
+        dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
+        yield Case(f"DIS ultrafast {label(size)}", _over_pairs(greys, lambda a, b, dis=dis: dis.calc(a, b, None)))  # pyright: ignore[reportCallIssue, reportArgumentType]
+        yield Case(f"Farneback {label(size)}", _over_pairs(greys, _farneback))
+
+
+def record_approach(size: Size) -> list[dict[str, Any]]:
+    """Observations of the environment in the servo's first second of one ``opaque`` scene."""
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=size)
+    observation, _ = env.reset(seed=0)
+    policy = ServoPolicy(Perception(_camera(size), support_height_m=TABLE_HEIGHT))
+    policy.reset(0)
+    recorded = []
+    for _ in range(_FRAMES):
+        recorded.append(observation)
+        observation, *_ = env.step(policy.act(observation))
+    env.close()
+    return recorded
+
+
+def peer_cases() -> Iterator[Case]:
+    """Comparable environments: robosuite always, the others where the extra ``bench`` is installed."""
+    yield from _lift_cases()
+    if importlib.util.find_spec("gymnasium_robotics"):
+        import gymnasium_robotics
+
+        gym.register_envs(gymnasium_robotics)
+        yield from _gymnasium_cases("fetch", "FetchPickAndPlace-v4", {"width": 128, "height": 128})
+    if importlib.util.find_spec("panda_gym"):
+        import panda_gym  # noqa: F401 - registers its environments
+
+        yield from _gymnasium_cases("panda-gym", "PandaPickAndPlace-v3", {"render_width": 128, "render_height": 128})
+
+
+def _lift_cases() -> Iterator[Case]:
+    from fixation_gym.envs import robosuite_backend
+
+    for size in (None, 128):
+        env = robosuite_backend.make_lift(CONTROL_FREQUENCY, size)
+        env.reset()
+        action = np.zeros(env.action_dim)
+        suffix = "" if size is None else f" {label((size, size))}"
+        yield Case(f"lift step{suffix}", lambda env=env, action=action: env.step(action), env.close)
+        yield Case(f"lift reset{suffix}", env.reset)
+
+
+def _gymnasium_cases(name: str, env_id: str, size: dict[str, int]) -> Iterator[Case]:
+    """Step and reset without image, and a step followed by an image."""
+    env = gym.make(env_id, max_episode_steps=_ENDLESS)
+    env.reset(seed=0)
+    yield Case(f"{name} step", _stepper(env), env.close)
+    yield Case(f"{name} reset", env.reset)
+    seeing = gym.make(env_id, max_episode_steps=_ENDLESS, render_mode="rgb_array", **size)
+    seeing.reset(seed=0)
+    step = _stepper(seeing)
+    yield Case(f"{name} step 128x128", lambda: (step(), seeing.render()), seeing.close)
+
+
+def _stepper(env: gym.Env[Any, Any]) -> Callable[[], Any]:
+    """Step with a slow cyclic action."""
+    shape = env.action_space.shape or (1,)
+    count = 0
+
+    def run() -> None:
+        nonlocal count
+        action = np.zeros(shape, np.float32)
+        action[0], action[1] = 0.3 * np.cos(0.1 * count), 0.3 * np.sin(0.1 * count)
+        env.step(action)
+        count += 1
+
+    return run
+
+
+def _replay(perception: Perception, observations: list[Observation]) -> Callable[[], Any]:
+    """Feed the recording frame by frame, over and over."""
+    index = 0
+
+    def run() -> None:
+        nonlocal index
+        if index == len(observations):
+            perception.reset()
+            index = 0
+        perception.update(observations[index])
+        index += 1
+
+    return run
+
+
+def _act(size: Size, recorded: list[dict[str, Any]]) -> Callable[[], Any]:
+    policy = ServoPolicy(Perception(_camera(size), support_height_m=TABLE_HEIGHT))
+    index = 0
+
+    def run() -> None:
+        nonlocal index
+        if index == len(recorded):
+            policy.reset(0)
+            index = 0
+        policy.act(recorded[index])
+        index += 1
+
+    return run
+
+
+def _over_pairs(greys: list[Any], flow: Callable[[Any, Any], Any]) -> Callable[[], Any]:
+    index = 1
+
+    def run() -> None:
+        nonlocal index
+        flow(greys[index - 1], greys[index])
+        index = index % (len(greys) - 1) + 1
+
+    return run
+
+
+def _farneback(first: Any, second: Any) -> Any:
+    return cv2.calcOpticalFlowFarneback(first, second, None, 0.5, 3, 15, 3, 5, 1.2, 0)  # pyright: ignore[reportCallIssue, reportArgumentType]
+
+
+def _camera(size: Size) -> Intrinsics:
+    return Intrinsics.from_fovy(*size, CAMERA_FOVY)
