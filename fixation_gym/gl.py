@@ -69,8 +69,8 @@ def select_backend() -> str:
             f"no GL library renders here; on Debian or Ubuntu: apt-get install {' '.join(DEBIAN_PACKAGES)}"
         )
     os.environ.update(backend_environment(backend), **{_CHECKED: backend})
-    if not chosen and _CONTEXT_MODULE in sys.modules:
-        # MuJoCo was imported first and took its default, a window; now it reads MUJOCO_GL again.
+    if _CONTEXT_MODULE in sys.modules:
+        # MuJoCo was imported first and may have taken its default, a window; now it reads MUJOCO_GL again.
         importlib.reload(sys.modules[_CONTEXT_MODULE])
     return backend
 

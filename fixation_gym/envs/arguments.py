@@ -42,7 +42,9 @@ def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
         high = np.array(bounds, dtype=np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
-    image = {} if image_size is None else {"rgb": spaces.Box(0, 255, (*image_size, 3), np.uint8)}
+    image: dict[str, spaces.Space[Any]] = {}
+    if image_size is not None:
+        image["rgb"] = spaces.Box(0, 255, (*image_size, 3), np.uint8)
     return spaces.Dict(
         image
         | {

@@ -67,7 +67,16 @@ def make_lift(control_frequency: int, image_size: int | None) -> Any:
     """Robosuite's own ``Lift`` with the wrist camera's square image, or without; the benchmark's peer."""
     from robosuite.environments.manipulation.lift import Lift
 
-    options = {"use_camera_obs": False, "has_offscreen_renderer": False}
-    if image_size is not None:
-        options = {"camera_names": "robot0_eye_in_hand", "camera_heights": image_size, "camera_widths": image_size}
-    return Lift(robots="Panda", control_freq=control_frequency, horizon=10**9, hard_reset=False, **options)
+    seeing = image_size is not None
+    size = image_size or 1
+    return Lift(
+        robots="Panda",
+        control_freq=control_frequency,
+        horizon=10**9,
+        hard_reset=False,
+        has_offscreen_renderer=seeing,
+        use_camera_obs=seeing,
+        camera_names="robot0_eye_in_hand",
+        camera_heights=size,
+        camera_widths=size,
+    )

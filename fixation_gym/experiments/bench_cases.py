@@ -114,7 +114,7 @@ def _lift_cases() -> Iterator[Case]:
         yield Case(f"lift reset{suffix}", env.reset)
 
 
-def _gymnasium_cases(name: str, env_id: str, size: dict[str, int]) -> Iterator[Case]:
+def _gymnasium_cases(name: str, env_id: str, size: dict[str, Any]) -> Iterator[Case]:
     """Step and reset without image, and a step followed by an image."""
     env = gym.make(env_id, max_episode_steps=_ENDLESS)
     env.reset(seed=0)

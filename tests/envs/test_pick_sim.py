@@ -1,0 +1,100 @@
+"""The fast paths of the simulation against slow ones that are plainly right."""
+
+import cv2
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+
+from fixation_gym.control import computed_torque
+from fixation_gym.control.computed_torque import arm_torques, camera_kinematics
+from fixation_gym.control.resolved_rate import joint_velocities
+from fixation_gym.envs.config import SCENARIOS
+from fixation_gym.envs.pick_sim import POSTURE
+from fixation_gym.envs.scene import sample_scene
+from fixation_gym.robot import HAND_EYE
+
+pytestmark = pytest.mark.sim
+
+
+@pytest.fixture(scope="module")
+def sim():
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=None).unwrapped
+    env.reset(seed=3)
+    for _ in range(10):
+        env.step(np.array([0.3, -0.2, 0.2, 0.1, 0.0, 0.2, -1.0]))
+    yield env.sim
+    env.close()
+
+
+def test_camera_pose_and_jacobian_are_those_of_mujoco(sim):
+    model, data = sim.model, sim.data
+    pose, jacobian = camera_kinematics(sim._arm_dynamics, HAND_EYE)
+    mujoco.mj_camlight(model, data)
+    camera = data.cam("wrist")
+    # MuJoCo's cameras look along -z with y up.
+    np.testing.assert_allclose(pose[:3, :3], camera.xmat.reshape(3, 3) @ np.diag([1, -1, -1]), atol=1e-9)
+    np.testing.assert_allclose(pose[:3, 3], camera.xpos, atol=1e-9)
+    world = np.zeros((6, model.nv))
+    mujoco.mj_jac(model, data, world[:3], world[3:], pose[:3, 3], model.body("robot0_right_hand").id)
+    rotation = pose[:3, :3].T
+    np.testing.assert_allclose(jacobian, np.vstack([rotation @ world[:3, :7], rotation @ world[3:, :7]]), atol=1e-9)
+
+
+def test_torques_are_those_of_the_dense_mass_matrix(sim):
+    model, data, arm = sim.model, sim.data, sim._arm_dynamics
+    mujoco.mj_step1(model, data)
+    twist, command, torques = np.array([0.05, 0, 0.02, 0, 0.1, 0]), data.qpos[:7] + 0.001, np.zeros(7)
+    _, jacobian = camera_kinematics(arm, HAND_EYE)
+    velocity = joint_velocities(jacobian, twist, data.qpos[:7].copy(), POSTURE, sim._task.limits)
+    lead = command + velocity * model.opt.timestep - data.qpos[:7]
+    acceleration = computed_torque._VELOCITY_GAIN * (velocity - data.qvel[:7]) + computed_torque._POSITION_GAIN * lead
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, mass, data.qM)
+    expected = mass[:7, :7] @ acceleration + data.qfrc_bias[:7] - data.qfrc_passive[:7]
+    arm_torques(arm, sim._task, twist, command, torques)
+    np.testing.assert_allclose(torques, expected, atol=1e-9)
+
+
+def test_the_start_pose_is_the_scenes(sim):
+    scene = sample_scene(SCENARIOS["clear"], np.random.default_rng(5))
+    sim.reset(scene)
+    pose = sim.arm_state().camera_pose
+    np.testing.assert_allclose(pose[:3, 3], scene.camera_position, atol=1e-5)
+    gaze = pose[:3, :3].T @ (np.array(scene.gaze_point) - pose[:3, 3])
+    np.testing.assert_allclose(gaze[:2], 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("scenario", ["opaque", "translucent", "mirror"])
+def test_the_fast_view_shows_what_the_view_in_full_quality_shows(scenario):
+    env = gym.make("FixationPick-v0", scenario=scenario, sensor_noise="ideal", image_size=(120, 160)).unwrapped
+    for seed in (0, 1):
+        env.reset(seed=seed)
+        fast, full = (env._image(view, env.sim.data.qpos).astype(np.float32) for view in ("observation", "wrist"))
+        grey = full.mean(axis=-1)
+        steep = np.hypot(cv2.Sobel(grey, -1, 1, 0), cv2.Sobel(grey, -1, 0, 1)) > 60
+        flat = cv2.dilate(steep.astype(np.uint8), np.ones((3, 3))) == 0
+        difference = np.abs(fast - full).mean(axis=-1)
+        assert flat.mean() > 0.2
+        assert difference[flat].mean() < 3.0
+        assert np.percentile(difference[flat], 99) < 20.0
+    env.close()
+
+
+def test_resting_objects_sleep_and_wake_at_a_touch():
+    env = gym.make("FixationPick-v0", image_size=None).unwrapped
+    env.reset(seed=0)
+    for _ in range(10):
+        env.step(np.zeros(7))
+    sim = env.sim
+    before = sim.body_position("target").copy()
+    np.testing.assert_allclose(before, env.scene.target.position, atol=2e-3)
+    assert sim.data.ntree_awake == 1  # the arm
+    while np.linalg.norm(sim.tool_position() - before) > 0.005 and env._steps < 200:
+        pose = sim.arm_state().camera_pose
+        towards = pose[:3, :3].T @ (before - sim.tool_position())
+        env.step(np.array([*np.clip(30.0 * towards, -0.6, 0.6), 0, 0, 0, 1.0]))
+    for _ in range(10):
+        env.step(np.array([0.6, 0, 0, 0, 0, 0, 1.0]))
+    assert np.linalg.norm(sim.body_position("target") - before) > 0.01
+    env.close()
