@@ -40,9 +40,11 @@ def matrix_to_pose(matrix: FloatArray) -> FloatArray:
 
 def inverse(matrix: FloatArray) -> FloatArray:
     """Inverse of a rigid transform, shape (4, 4)."""
-    result = np.eye(4)
-    result[:3, :3] = matrix[:3, :3].T
-    result[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
+    result = np.zeros((4, 4))
+    rotation = matrix[:3, :3].T
+    result[:3, :3] = rotation
+    result[:3, 3] = -(rotation @ matrix[:3, 3])
+    result[3, 3] = 1.0
     return result
 
 
