@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -40,6 +40,11 @@ class Intrinsics:
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     @cached_property
+    def inverse_matrix(self) -> FloatArray:
+        """Inverse of K, shape (3, 3): pixels (u, v, 1) to normalised (x, y, 1)."""
+        return np.linalg.inv(self.matrix)
+
+    @cached_property
     def grid(self) -> tuple[FloatArray, FloatArray]:
         """Normalised coordinates x and y of every pixel centre, each of shape (H, W); read-only."""
         columns = (np.arange(self.width) - self.cx) / self.fx
@@ -51,10 +56,7 @@ class Intrinsics:
 
     def scaled(self, height: int, width: int) -> Intrinsics:
         """Intrinsics of the same view resampled to another size."""
-        sx, sy = width / self.width, height / self.height
-        cx = (self.cx + 0.5) * sx - 0.5
-        cy = (self.cy + 0.5) * sy - 0.5
-        return Intrinsics(width, height, self.fx * sx, self.fy * sy, cx, cy)
+        return _scaled(self, height, width)
 
     def project(self, points_cam: FloatArray) -> FloatArray:
         """Project points, shape (..., 3) in ``cam`` in m, to pixels, shape (..., 2); NaN behind the camera."""
@@ -68,3 +70,12 @@ class Intrinsics:
         """Pixels, shape (..., 2), to normalised image coordinates, shape (..., 2)."""
         pixels = np.asarray(pixels, dtype=np.float64)
         return (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
+
+
+@lru_cache(maxsize=32)
+def _scaled(camera: Intrinsics, height: int, width: int) -> Intrinsics:
+    """Cached because the grid of the result is: perception asks for the same few sizes in every frame."""
+    sx, sy = width / camera.width, height / camera.height
+    cx = (camera.cx + 0.5) * sx - 0.5
+    cy = (camera.cy + 0.5) * sy - 0.5
+    return Intrinsics(width, height, camera.fx * sx, camera.fy * sy, cx, cy)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.linalg import expm
-from scipy.spatial.transform import Rotation
 
-from fixation_gym.geometry.rigid import inverse
+from fixation_gym.geometry.rigid import inverse, rotation_vector
 from fixation_gym.types import FloatArray
 
 
@@ -45,10 +46,14 @@ def mean_twist(T_a_start: FloatArray, T_a_end: FloatArray, duration: float) -> F
     if duration <= 0.0:
         raise ValueError(f"duration must be positive, got {duration}")
     motion = inverse(T_a_start) @ T_a_end
-    angle_axis = Rotation.from_matrix(motion[:3, :3]).as_rotvec()
-    angle = float(np.linalg.norm(angle_axis))
-    hat = skew(angle_axis)
+    x, y, z = rotation_vector(motion[:3, :3])
+    tx, ty, tz = motion[:3, 3].tolist()
+    angle = math.sqrt(x * x + y * y + z * z)
     # Below 1e-4 rad the closed form divides rounding errors by angle^2; the Taylor value 1/12 is exact to 1e-9.
-    factor = 1.0 / 12.0 if angle < 1e-4 else (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
-    v = (np.eye(3) - 0.5 * hat + factor * hat @ hat) @ motion[:3, 3]
-    return np.array([*v, *angle_axis]) / duration
+    factor = 1.0 / 12.0 if angle < 1e-4 else (1.0 - 0.5 * angle / math.tan(0.5 * angle)) / angle**2
+    # v = t - r x t / 2 + factor r x (r x t): the inverse of the left Jacobian of SE(3), in scalars for speed.
+    cx, cy, cz = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
+    vx = tx - 0.5 * cx + factor * (y * cz - z * cy)
+    vy = ty - 0.5 * cy + factor * (z * cx - x * cz)
+    vz = tz - 0.5 * cz + factor * (x * cy - y * cx)
+    return np.array([vx, vy, vz, x, y, z]) / duration

@@ -4,16 +4,21 @@ The state (alpha, beta, rho) is the object seen from an anchor camera: the point
 base frame (inverse depth after Civera, Davison & Montiel 2008). Poses enter as they are: differentiating them into
 velocities, as a filter on twist and flow must, would waste most of their information.
 
-Everything is value in, value out: ``initialise``, ``predict``, ``update``, ``distance_at``.
+Everything is value in, value out: ``initialise``, ``predict``, ``update``, ``distance_at``. The algebra of three
+numbers is written in scalars: a NumPy call costs as much as twenty of them.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fixation_gym.types import FloatArray
+
+_Vector = tuple[float, float, float]
+_Rows = list[list[float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +105,17 @@ def initialise(centroid: FloatArray, T_base_cam: FloatArray, settings: DistanceS
 
 def predict(state: DistanceState, dt: float, settings: DistanceSettings, visible: bool = True) -> DistanceState:
     """Let the object walk randomly for ``dt`` s; more so while it is not seen."""
-    alpha, beta, rho = state.mean
+    alpha, beta, rho = state.mean.tolist()
     walk = settings.walk_m if visible else settings.lost_walk_m
-    # A displacement of the point by 1 m changes (alpha, beta, rho) by these columns.
-    jacobian = rho * np.array([[1.0, 0.0, -alpha], [0.0, 1.0, -beta], [0.0, 0.0, -rho]])
-    return replace(state, cov=state.cov + walk**2 * dt * jacobian @ jacobian.T)
+    # A displacement of the point by 1 m along x, y, z changes (alpha, beta, rho) by rho times (1, 0, 0), (0, 1, 0) and
+    # (-alpha, -beta, -rho).
+    q = walk**2 * dt * rho**2
+    noise = [
+        [q * (1.0 + alpha * alpha), q * alpha * beta, q * alpha * rho],
+        [q * alpha * beta, q * (1.0 + beta * beta), q * beta * rho],
+        [q * alpha * rho, q * beta * rho, q * rho * rho],
+    ]
+    return replace(state, cov=state.cov + np.array(noise))
 
 
 def update(
@@ -125,26 +136,23 @@ def update(
         image_std: standard deviation of the object's pixels about the centroid, normalised coordinates.
         touches_border: whether the object is cut by the image border.
     """
-    predicted, jacobian = _projection(state, state.mean, T_base_cam)
-    ray_std = _ray_std(settings, image_std, touches_border)
-    noise = (ray_std**2 + (state.mean[2] * settings.position_std_m) ** 2) * np.eye(2)
-    innovation = centroid - predicted
-    spread = jacobian @ state.cov @ jacobian.T + noise
-    nis = float(innovation @ np.linalg.solve(spread, innovation))
+    view = _view(state, T_base_cam)
+    prior = tuple(state.mean.tolist())
+    seen = (float(centroid[0]), float(centroid[1]))
+    noise = _ray_std(settings, image_std, touches_border) ** 2 + (prior[2] * settings.position_std_m) ** 2
+    cov = state.cov.tolist()
+    mean, nis, gain, jacobian = _gauss_newton_step(view, prior, prior, cov, seen, noise)
     if nis > settings.gate:
         rejected = state.rejected + 1
         if rejected >= settings.alarm_count:
             return _restart(state, centroid, T_base_cam, settings)
         return replace(state, nis=nis, rejected=rejected)
-    mean, gain = state.mean, np.zeros((3, 2))
-    for _ in range(3):
-        predicted, jacobian = _projection(state, mean, T_base_cam)
-        gain = state.cov @ jacobian.T @ np.linalg.inv(jacobian @ state.cov @ jacobian.T + noise)
-        mean = state.mean + gain @ (centroid - predicted - jacobian @ (state.mean - mean))
-        mean[2] = max(mean[2], MIN_INVERSE_DEPTH)
-    keep = np.eye(3) - gain @ jacobian
-    cov = keep @ state.cov @ keep.T + gain @ noise @ gain.T  # Joseph form: stays positive
-    return DistanceState(state.T_base_anchor, mean, cov, nis, 0)
+    for _ in range(2):
+        mean, _, gain, jacobian = _gauss_newton_step(view, prior, mean, cov, seen, noise)
+    gains = np.array(gain)  # (3, 2)
+    keep = _IDENTITY - gains @ np.array(jacobian)
+    posterior = keep @ state.cov @ keep.T + noise * (gains @ gains.T)  # Joseph form: stays positive
+    return DistanceState(state.T_base_anchor, np.array(mean), posterior, nis, 0)
 
 
 def distance_at(
@@ -156,15 +164,24 @@ def distance_at(
         Depth in m (at least 1 cm), its standard deviation in m including the momentary pose noise, and the point in
         base, shape (3,), m.
     """
-    anchor, (alpha, beta, rho) = state.T_base_anchor, state.mean
-    ray = anchor[:3, :3] @ [alpha, beta, 1.0]
+    alpha, beta, rho = state.mean.tolist()
+    anchor = state.T_base_anchor
+    ray = anchor[:3, :3] @ np.array([alpha, beta, 1.0])
     point = anchor[:3, 3] + ray / rho
     axis = T_base_cam[:3, 2]
     depth = float(axis @ (point - T_base_cam[:3, 3]))
-    across = axis @ anchor[:3, :2]
-    jacobian = np.array([across[0], across[1], -(axis @ ray) / rho]) / rho
-    variance = float(jacobian @ state.cov @ jacobian) + settings.position_std_m**2
-    return max(depth, MIN_DEPTH_M), float(np.sqrt(variance)), point
+    ax, ay, _ = (axis @ anchor[:3, :3]).tolist()
+    # Derivative of the depth by (alpha, beta, rho), times rho, against the covariance.
+    j = (ax, ay, -float(axis @ ray) / rho)
+    spread = _times(state.cov.tolist(), j)
+    variance = (j[0] * spread[0] + j[1] * spread[1] + j[2] * spread[2]) / rho**2 + settings.position_std_m**2
+    return max(depth, MIN_DEPTH_M), math.sqrt(variance), point
+
+
+def predicted_centroid(state: DistanceState, T_base_cam: FloatArray) -> FloatArray:
+    """Normalised image coordinates, shape (2,), where a camera should see the object."""
+    image, _ = _projection(_view(state, T_base_cam), tuple(state.mean.tolist()))
+    return np.array(image)
 
 
 def fixation_at(
@@ -190,28 +207,74 @@ def fixation_at(
     depth, std, point = distance_at(state, T_base_cam, settings)
     visible = centroid is not None
     if centroid is None:
-        centroid, _ = _projection(state, state.mean, T_base_cam)
+        centroid = predicted_centroid(state, T_base_cam)
     if settings.flat_target:
         depth *= max(0.5, 1.0 - 4.0 * mean_variance)
     return Fixation(visible, np.array(centroid), point, depth, std, state.nis, True)
 
 
-def _projection(state: DistanceState, mean: FloatArray, T_base_cam: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Image of the point (2,) and its derivative by (alpha, beta, rho), shape (2, 3)."""
-    rotation = T_base_cam[:3, :3].T @ state.T_base_anchor[:3, :3]
-    baseline = T_base_cam[:3, :3].T @ (state.T_base_anchor[:3, 3] - T_base_cam[:3, 3])
-    ray = mean[2] * baseline + rotation @ [mean[0], mean[1], 1.0]
-    depth = max(ray[2], 1e-3)
-    image = ray[:2] / depth
-    columns = np.column_stack([rotation[:, 0], rotation[:, 1], baseline])
-    return image, (columns[:2] - np.outer(image, columns[2])) / depth
+def _view(state: DistanceState, T_base_cam: FloatArray) -> _Rows:
+    """Rows (r_x, r_y, r_z, b) of the anchor's rotation and of the baseline to it, as the camera sees them.
+
+    The image of the state is the direction with components r_x alpha + r_y beta + r_z + b rho.
+    """
+    to_cam = T_base_cam[:3, :3].T
+    rows = np.empty((3, 4))
+    rows[:, :3] = to_cam @ state.T_base_anchor[:3, :3]
+    rows[:, 3] = to_cam @ (state.T_base_anchor[:3, 3] - T_base_cam[:3, 3])
+    return rows.tolist()
+
+
+def _projection(view: _Rows, mean: _Vector) -> tuple[tuple[float, float], tuple[_Vector, _Vector]]:
+    """Image (x, y) of the point and the derivatives of x and of y by (alpha, beta, rho)."""
+    alpha, beta, rho = mean
+    (xa, xb, xc, xr), (ya, yb, yc, yr), (za, zb, zc, zr) = view
+    depth = max(za * alpha + zb * beta + zc + zr * rho, 1e-3)
+    x = (xa * alpha + xb * beta + xc + xr * rho) / depth
+    y = (ya * alpha + yb * beta + yc + yr * rho) / depth
+    by_x = ((xa - x * za) / depth, (xb - x * zb) / depth, (xr - x * zr) / depth)
+    by_y = ((ya - y * za) / depth, (yb - y * zb) / depth, (yr - y * zr) / depth)
+    return (x, y), (by_x, by_y)
+
+
+def _gauss_newton_step(
+    view: _Rows, prior: _Vector, mean: _Vector, cov: _Rows, seen: tuple[float, float], noise: float
+) -> tuple[_Vector, float, list[tuple[float, float]], tuple[_Vector, _Vector]]:
+    """Linearise at ``mean`` and correct ``prior``.
+
+    Returns:
+        The corrected mean, the normalised innovation squared, the gain (3 rows of 2) and the jacobian (2 rows of 3).
+    """
+    (x, y), jacobian = _projection(view, mean)
+    jx, jy = jacobian
+    px, py = _times(cov, jx), _times(cov, jy)
+    change = (prior[0] - mean[0], prior[1] - mean[1], prior[2] - mean[2])
+    ex = seen[0] - x - (jx[0] * change[0] + jx[1] * change[1] + jx[2] * change[2])
+    ey = seen[1] - y - (jy[0] * change[0] + jy[1] * change[1] + jy[2] * change[2])
+    sxx = jx[0] * px[0] + jx[1] * px[1] + jx[2] * px[2] + noise
+    sxy = jx[0] * py[0] + jx[1] * py[1] + jx[2] * py[2]
+    syy = jy[0] * py[0] + jy[1] * py[1] + jy[2] * py[2] + noise
+    determinant = sxx * syy - sxy * sxy
+    gain = [((a * syy - b * sxy) / determinant, (b * sxx - a * sxy) / determinant) for a, b in zip(px, py, strict=True)]
+    (ax, ay), (bx, by), (rx, ry) = gain
+    alpha, beta = prior[0] + ax * ex + ay * ey, prior[1] + bx * ex + by * ey
+    rho = max(prior[2] + rx * ex + ry * ey, MIN_INVERSE_DEPTH)
+    nis = (syy * ex * ex - 2.0 * sxy * ex * ey + sxx * ey * ey) / determinant
+    return (alpha, beta, rho), nis, gain, jacobian
+
+
+def _times(matrix: _Rows, vector: _Vector) -> _Vector:
+    """Product of a (3, 3) matrix and a vector."""
+    a, b, c = vector
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
+    return xx * a + xy * b + xz * c, yx * a + yy * b + yz * c, zx * a + zy * b + zz * c
 
 
 def _ray_std(settings: DistanceSettings, image_std: float, touches_border: bool) -> float:
     """Standard deviation of a centroid in normalised coordinates, without the position noise."""
     share = settings.border_std_size if touches_border else settings.centroid_std_size
     terms = (settings.centroid_std_px / _REFERENCE_FOCAL_PX, settings.rotation_std_rad, share * image_std)
-    return float(np.linalg.norm(terms))
+    return math.hypot(*terms)
 
 
 def _restart(
@@ -232,3 +295,4 @@ MIN_INVERSE_DEPTH = 1e-3
 MIN_DEPTH_M = 0.01
 """Objects nearer than this, or behind the camera, are reported at this depth, m."""
 _REFERENCE_FOCAL_PX = 308.0
+_IDENTITY = np.eye(3)

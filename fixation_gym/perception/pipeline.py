@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
+from functools import lru_cache
 
-import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import distance_filters as distance
+from fixation_gym.perception import kernels
 from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState, Fixation
+from fixation_gym.perception.gradients import FlowSettings
 from fixation_gym.perception.optic_flow import (
-    Float32Array,
     Flow,
-    FlowSettings,
     estimate_flow,
     flow_grid,
     invalid_flow,
     plane_homography,
+    prepare_grey,
 )
+from fixation_gym.perception.scratch import Float32Array, Scratch
 from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
 from fixation_gym.perception.zero_flow import Gaze, ZeroFlow, ZeroFlowSettings, unknown_zero_flow, zero_flow_test
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
@@ -101,6 +104,9 @@ class Perception:
         while intrinsics.width > self._settings.flow.max_width * 2**halvings:
             halvings += 1
         self._working = intrinsics.scaled(shape[0] >> halvings, shape[1] >> halvings)
+        self._scratch = Scratch()
+        if kernels.enabled:
+            _run_once()
         self.reset()
 
     def reset(self) -> None:
@@ -125,7 +131,8 @@ class Perception:
         fixation = self._follow(observation.time, T_base_cam, segmentation)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
-        self._frames.append(_Frame(observation.time, self._grey(observation.rgb), T_base_cam, segmentation))
+        grey = prepare_grey(observation.rgb, self._working.height, self._working.width, self._settings.flow)
+        self._frames.append(_Frame(observation.time, grey, T_base_cam, segmentation))
         flow, zero_flow = self._look_for_obstacles()
         middle = self._frames[max(0, len(self._frames) - 2)]
         return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam)
@@ -136,7 +143,7 @@ class Perception:
             found = f"{observation.rgb.dtype} of shape {observation.rgb.shape}"
             raise ValueError(f"rgb is {found}, but the intrinsics ask for uint8 of shape {expected}")
         pose = np.asarray(observation.camera_pose)
-        if pose.shape != (7,) or not np.all(np.isfinite(pose)) or not np.any(pose[3:]):
+        if pose.shape != (7,) or not all(map(math.isfinite, pose.tolist())) or not any(pose[3:].tolist()):
             raise ValueError(f"camera_pose must be a finite position and quaternion (w, x, y, z), got {pose}")
         if self._frames and not observation.time > self._frames[-1].time:
             last = self._frames[-1].time
@@ -146,7 +153,7 @@ class Perception:
         settings = self._settings
         if self._state is None:
             return segment(rgb, self._intrinsics, settings.colour)
-        expected = distance.fixation_at(self._state, T_base_cam, settings.distance).centroid
+        expected = distance.predicted_centroid(self._state, T_base_cam)
         return segment(rgb, self._intrinsics, settings.colour, expected)
 
     def _follow(self, time: float, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
@@ -156,25 +163,13 @@ class Perception:
             self._state = distance.predict(self._state, time - self._frames[-1].time, settings, seen.visible)
         if not seen.visible:
             return distance.fixation_at(self._state, T_base_cam, settings)
-        mean_variance = 0.5 * float(np.trace(seen.second_moments))
+        mean_variance = 0.5 * float(seen.second_moments[0, 0] + seen.second_moments[1, 1])
         if self._state is None:
             self._state = distance.initialise(seen.centroid, T_base_cam, settings)
         else:
-            size = float(np.sqrt(mean_variance))
+            size = math.sqrt(mean_variance)
             self._state = distance.update(self._state, seen.centroid, T_base_cam, settings, size, seen.touches_border)
         return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance)
-
-    def _grey(self, rgb: ImageArray) -> Float32Array:
-        """Grey image at working resolution without its slow variations, grey levels."""
-        grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-        size = (self._working.width, self._working.height)
-        if grey.shape != (size[1], size[0]):
-            grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
-        # Highlights and shading stay in the image while surfaces move through it; on weak texture they would pass for
-        # motion. They vary slowly over the image, so the local mean takes them out, and exposure changes with them.
-        grey = grey.astype(np.float32)
-        side = 2 * (self._settings.flow.illumination_window // 2) + 1
-        return grey - cv2.blur(grey, (side, side))
 
     def _look_for_obstacles(self) -> tuple[Flow, ZeroFlow]:
         """Flow and zero-flow test at the middle one of the last three frames."""
@@ -198,9 +193,26 @@ class Perception:
             (to_first, to_last),
             inverse_distance,
             settings.flow,
+            self._scratch,
         )
         if not (middle.segmentation.visible and last.segmentation.visible):
             return flow, unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
         gaze = Gaze(twist, inverse_distance, inverse_std, middle.segmentation.mask, middle.T_base_cam)
         return flow, zero_flow_test(flow, gaze, settings.zero_flow, self._self_mask, self.support_height_m)
+
+
+@lru_cache(maxsize=1)
+def _run_once() -> None:
+    """Run every stage on a small made-up scene, so that no frame of a live camera waits for compiled code to be made.
+
+    It takes seconds on the first use after an installation, when nothing is cached on disk, and a fraction later.
+    """
+    camera = Intrinsics.from_fovy(96, 96, 0.7)
+    rgb = np.random.default_rng(0).integers(0, 256, (96, 96, 3), dtype=np.uint8)
+    rgb[40:56, 40:56] = 255, 0, 0
+    seen = segment(rgb, camera)
+    settings, maps = FlowSettings(), (np.eye(3), np.eye(3))
+    frames = [prepare_grey(np.roll(rgb, shift, axis=1), 96, 96, settings) for shift in range(3)]
+    flow = estimate_flow(frames, (0.0, 1.0, 2.0), camera, maps, 1.0, settings)
+    zero_flow_test(flow, Gaze(np.eye(6)[0], 1.0, 0.1, seen.mask, np.eye(4)), ZeroFlowSettings(), None, 0.0)

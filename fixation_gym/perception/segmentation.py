@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception import kernels, pixel_kernels
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 
@@ -67,25 +70,64 @@ def segment(
         expected: normalised image coordinates, shape (2,), where the target should be; a second object of the same
             colour then wins only if it is much larger. None: the largest group wins.
     """
-    mask = _largest_group(_colour_mask(rgb, colour), colour, intrinsics, expected)
-    moments = cv2.moments(mask, binaryImage=True)
-    height, width = mask.shape
+    height, width = rgb.shape[:2]
+    window = _search_window(rgb, colour)
+    if window is None:
+        return _not_visible(height, width)
+    part = _largest_group(_colour_mask(rgb, window, colour), colour, intrinsics, window, expected)
+    moments = cv2.moments(part, binaryImage=True)
     area = moments["m00"]
     if area < max(4.0, colour.min_area_fraction * height * width):
         return _not_visible(height, width)
-    pixel = np.array([moments["m10"], moments["m01"]]) / area
-    scale = np.array([intrinsics.fx, intrinsics.fy])
+    rows, columns = window
+    u, v = moments["m10"] / area + columns.start, moments["m01"] / area + rows.start
     # A pixel is a unit square, so even a single one has a variance of 1/12 px^2.
-    spread = np.array([[moments["mu20"], moments["mu11"]], [moments["mu11"], moments["mu02"]]]) / area + np.eye(2) / 12
-    borders = (mask[0], mask[-1], mask[:, 0], mask[:, -1])
+    xx, xy, yy = moments["mu20"] / area + 1 / 12, moments["mu11"] / area, moments["mu02"] / area + 1 / 12
+    fx, fy = intrinsics.fx, intrinsics.fy
+    mask = np.zeros((height, width), np.uint8)
+    mask[window] = part
+    borders = (
+        (rows.start == 0, part[0]),
+        (rows.stop == height, part[-1]),
+        (columns.start == 0, part[:, 0]),
+        (columns.stop == width, part[:, -1]),
+    )
     return Segmentation(
         mask=mask.view(np.bool_),
         visible=True,
-        centroid=intrinsics.normalise(pixel),
-        second_moments=spread / np.outer(scale, scale),
+        centroid=np.array([(u - intrinsics.cx) / fx, (v - intrinsics.cy) / fy]),
+        second_moments=np.array([[xx / (fx * fx), xy / (fx * fy)], [xy / (fx * fy), yy / (fy * fy)]]),
         area_fraction=area / (height * width),
-        touches_border=any(bool(border.any()) for border in borders),
+        touches_border=any(at_border and bool(line.any()) for at_border, line in borders),
     )
+
+
+def _search_window(rgb: ImageArray, colour: Colour) -> tuple[slice, slice] | None:
+    """Rows and columns of the image that can hold the target; None if there is no pixel of its colour.
+
+    Only a grid of pixels is looked at. Its step is so small that a compact target of the least area covers some of
+    them; parts of the target in between lie within the merge gap, which is added all around.
+    """
+    height, width = rgb.shape[:2]
+    step = max(2, _group_step(width))
+    size = (max(1, width // step), max(1, height // step))
+    found = _in_colour_range(rgb, (slice(0, size[1] * step), slice(0, size[0] * step)), colour, step)
+    left, top, columns, rows = cv2.boundingRect(found)
+    if not columns:
+        return None
+    margin = step * (2 + round(colour.merge_gap_fraction * size[0]))
+
+    def span(first: int, count: int, samples: int, length: int) -> slice:
+        # Steps stay whole, so that grouping halves or quarters the part as it would the image.
+        start, stop = step * first - margin, step * (first + count) + margin
+        return slice(max(0, start), length if first + count == samples else min(length, stop))
+
+    return span(top, rows, size[1], height), span(left, columns, size[0], width)
+
+
+def _group_step(width: int) -> int:
+    """Grouping needs no more than 160 columns."""
+    return max(1, width // 160)
 
 
 def _not_visible(height: int, width: int) -> Segmentation:
@@ -99,50 +141,113 @@ def _not_visible(height: int, width: int) -> Segmentation:
     )
 
 
-def _colour_mask(rgb: ImageArray, colour: Colour) -> ImageArray:
-    """Pixels within the colour range, without isolated ones; shape (H, W), 0 or 1."""
-    hsv = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV), np.uint8)  # OpenCV keeps hue in units of 2 degrees
+def _colour_mask(rgb: ImageArray, window: tuple[slice, slice], colour: Colour) -> ImageArray:
+    """Pixels of a part of the image within the colour range, without isolated ones; shape of the part, 0 or 1."""
+    # The median of 3 x 3 zeros and ones; OpenCV's medianBlur takes ten times as long on small images.
+    inside = _in_colour_range(rgb, window, colour)
+    count = cv2.boxFilter(inside, -1, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
+    return np.greater(count, 4).view(np.uint8)
+
+
+def _in_colour_range(rgb: ImageArray, window: tuple[slice, slice], colour: Colour, step: int = 1) -> ImageArray:
+    """Every ``step``-th pixel of a part of the image: 1 within the colour range, else 0."""
+    rows, columns = window
+    shape = ((rows.stop - rows.start) // step, (columns.stop - columns.start) // step)
+    if kernels.enabled:
+        result = np.empty(shape, np.uint8)
+        pixel_kernels.in_colour_range(rgb, (rows.start, columns.start), step, *_colour_tables(colour), result)
+        return result
+    part = rgb[window]
+    if step > 1:
+        part = cv2.resize(part, shape[::-1], interpolation=cv2.INTER_NEAREST)
+    hsv = np.asarray(cv2.cvtColor(part, cv2.COLOR_RGB2HSV), np.uint8)  # OpenCV keeps hue in units of 2 degrees
+    masks = [
+        np.asarray(cv2.inRange(hsv, (low, *_least_values(colour), 0), (high, 255, 255, 0)), np.uint8)
+        for low, high in _hue_ranges(colour)
+    ]
+    return (masks[0] if len(masks) == 1 else masks[0] | masks[1]) & np.uint8(1)
+
+
+def _hue_ranges(colour: Colour) -> list[tuple[int, int]]:
+    """One or, where the range wraps around, two ranges of hue in units of 2 degrees, ends included."""
     low, high = colour.hue_deg - colour.hue_tolerance_deg, colour.hue_deg + colour.hue_tolerance_deg
-    mask = _in_hue_range(hsv, max(low, 0.0), min(high, 360.0), colour)
+    ranges = [(max(low, 0.0), min(high, 360.0))]
     if low < 0.0:
-        mask |= _in_hue_range(hsv, low + 360.0, 360.0, colour)
+        ranges.append((low + 360.0, 360.0))
     if high > 360.0:
-        mask |= _in_hue_range(hsv, 0.0, high - 360.0, colour)
-    return np.asarray(cv2.medianBlur(mask, 3), np.uint8) & np.uint8(1)
+        ranges.append((0.0, high - 360.0))
+    return [(int(a / 2), int(b / 2)) for a, b in ranges]
 
 
-def _in_hue_range(hsv: ImageArray, low_deg: float, high_deg: float, colour: Colour) -> ImageArray:
-    lower = np.array([low_deg / 2, 255 * colour.min_saturation, 255 * colour.min_value]).astype(np.uint8)
-    upper = np.array([high_deg / 2, 255, 255]).astype(np.uint8)
-    return np.asarray(cv2.inRange(hsv, lower, upper), dtype=np.uint8)
+def _least_values(colour: Colour) -> tuple[int, int]:
+    """Least saturation and brightness, 0..255."""
+    return int(255 * colour.min_saturation), int(255 * colour.min_value)
 
 
-def _largest_group(mask: ImageArray, colour: Colour, intrinsics: Intrinsics, expected: FloatArray | None) -> ImageArray:
-    """Keep the best group of parts that lie closer together than the merge gap; shape (H, W), 0 or 1."""
-    step = max(1, mask.shape[1] // 160)  # grouping needs no more than 160 columns
-    small = cv2.resize(mask * np.uint8(255), None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA)
-    reach = max(3, 2 * round(colour.merge_gap_fraction * small.shape[1] / 2) + 1)
-    joined = cv2.dilate((small > 0).astype(np.uint8), np.ones((reach, reach), np.uint8))
-    count, labels = cv2.connectedComponents(joined)
+@lru_cache(maxsize=8)
+def _colour_tables(colour: Colour) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Tables of ``in_colour_range``: least spread by brightness, scale of hue by spread, hues in range."""
+    saturation, brightness = _least_values(colour)
+    values = np.maximum(np.arange(256), 1)
+    # OpenCV: saturation = (spread * round(255 * 4096 / value) + 2048) >> 12.
+    scale = np.rint(255 * 4096 / values).astype(np.int64)
+    saturations = (np.arange(256)[None, :] * scale[:, None] + 2048) >> 12
+    least = np.where(saturations[:, -1] >= saturation, (saturations >= saturation).argmax(axis=1), 256)
+    least[:brightness] = 256
+    hue_scale = np.rint(180 * 4096 / (6.0 * values))
+    hue_scale[0] = 0
+    hues = np.arange(181)
+    in_range = np.any([(hues >= low) & (hues <= high) for low, high in _hue_ranges(colour)], axis=0)
+    return least.astype(np.int32), hue_scale.astype(np.int32), in_range.astype(np.int32)
+
+
+def _largest_group(
+    mask: ImageArray,
+    colour: Colour,
+    intrinsics: Intrinsics,
+    window: tuple[slice, slice],
+    expected: FloatArray | None,
+) -> ImageArray:
+    """Keep the best group of parts that lie closer together than the merge gap; shape of the window, 0 or 1."""
+    step = _group_step(intrinsics.width)
+    columns, rows = intrinsics.width // step, intrinsics.height // step
+    small, present = mask, mask
+    if step > 1:
+        small = cv2.resize(mask * np.uint8(255), None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA)
+        present = (small > 0).view(np.uint8)
+    reach = max(3, 2 * round(colour.merge_gap_fraction * columns / 2) + 1)
+    count, labels = cv2.connectedComponents(cv2.dilate(present, _square(reach)))
     if count <= 2:
         return mask
-    weight = small.ravel().astype(np.float64) / 255
+    weight = small.ravel().astype(np.float64) / (255 if step > 1 else 1)
     area = np.bincount(labels.ravel(), weight, minlength=count)
     area[0] = 0.0
     if expected is not None:
-        area *= _closeness(labels, weight, intrinsics, expected)
+        x, y = intrinsics.scaled(rows, columns).grid
+        top, left = window[0].start // step, window[1].start // step
+        x, y = (axis[top : top + labels.shape[0], left : left + labels.shape[1]] for axis in (x, y))
+        area *= _closeness(labels, weight, (x, y), expected, 0.1 * intrinsics.width / intrinsics.fx)
     best = (labels == int(np.argmax(area))).astype(np.uint8)
     height, width = mask.shape
     return mask & cv2.resize(best, (width, height), interpolation=cv2.INTER_NEAREST)
 
 
-def _closeness(labels: np.ndarray, weight: FloatArray, intrinsics: Intrinsics, expected: FloatArray) -> FloatArray:
+@lru_cache(maxsize=8)
+def _square(side: int) -> ImageArray:
+    return np.ones((side, side), np.uint8)
+
+
+def _closeness(
+    labels: np.ndarray,
+    weight: FloatArray,
+    grid: tuple[FloatArray, FloatArray],
+    expected: FloatArray,
+    reach: float,
+) -> FloatArray:
     """Factor in 0..1 per group, shape (N,): 1 at the expected place, falling over a tenth of the image width."""
-    height, width = labels.shape
-    x, y = intrinsics.scaled(height, width).grid
+    x, y = grid
     flat = labels.ravel()
     total = np.maximum(np.bincount(flat, weight), 1e-9)
     dx = np.bincount(flat, weight * x.ravel()) / total - expected[0]
     dy = np.bincount(flat, weight * y.ravel()) / total - expected[1]
-    reach = 0.1 * intrinsics.width / intrinsics.fx
     return 1.0 / (1.0 + ((dx**2 + dy**2) / reach**2) ** 2)

@@ -12,48 +12,18 @@ its height and the camera pose.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
-from scipy.special import ndtr
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import epipolar_direction
-from fixation_gym.perception.optic_flow import Float32Array, Flow
+from fixation_gym.perception.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
+from fixation_gym.perception.optic_flow import Flow
+from fixation_gym.perception.pixel_test import PixelQuestion, pixel_answers
+from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
-
-CELLS = 32
-"""Cells along each side of the map."""
-UNKNOWN = 128
-"""Cell value where there is no evidence; otherwise P(nearer) times 255."""
-
-
-@dataclass(frozen=True, slots=True)
-class ZeroFlowSettings:
-    """Margins and gates of the test."""
-
-    depth_margin: float = 0.05
-    """An obstacle's inverse depth exceeds the fixated one by this share at least."""
-    height_margin_m: float = 0.015
-    """An obstacle rises above the support surface by this much at least, m."""
-    max_relative_std: float = 0.25
-    """A pixel has evidence if its inverse depth is known to this share of the fixated one."""
-    position_std_m: float = 1e-4
-    """Noise of each camera position, m."""
-    rotation_std_rad: float = 2e-4
-    """Noise of each camera orientation, rad."""
-    moving_gate: float = 15.0
-    """Motion across the epipolar line is independent above this chi-square (1 degree of freedom; 99.99 %)."""
-    moving_px: float = 0.25
-    """... and above this motion, px of the flow grid per frame interval."""
-    target_margin_px: int = 3
-    """The target is widened by this much, px of the flow grid: windows at its outline mix it with what is behind."""
-    cell_min_share: float = 0.06
-    """Least share of a cell's pixels that must have evidence."""
-    cell_min_front: float = 0.15
-    """Least front evidence in a cell and its 8 neighbours together, in cells; less is speckle."""
-    front_weight: float = 2.0
-    """Front evidence counts this much more than evidence of the free background in the same cell."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,36 +88,45 @@ def zero_flow_test(
         self_mask: pixels of the robot itself, any shape (H, W); they are unknown.
         support_height_m: height of the horizontal support surface in base, m; None if there is none.
     """
-    height, width = flow.overlap.shape
-    if not flow.valid or not np.linalg.norm(gaze.twist[:3]) > 1e-6:
-        return unknown_zero_flow(height, width)
-    x, y = _float_grid(flow.intrinsics)
-    gx, gy = _displacement_per_inverse_depth(flow, gaze.twist[:3], x, y)
-    excess, variance = _along(flow, gx, gy, settings)
-    inverse_depth = flow.warp_inverse_depth + excess
-    std = np.sqrt(variance)
-    target = _resampled(gaze.target, flow.overlap.shape, settings.target_margin_px)
-    usable = flow.overlap & ~target
+    shape = flow.overlap.shape
+    if not flow.valid or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
+        return unknown_zero_flow(*shape)
+    usable = flow.overlap & ~widened_on_grid(gaze.target, shape, settings.target_margin_px)
     if self_mask is not None:
-        usable &= ~_resampled(self_mask, flow.overlap.shape, 1)
-    supported = usable & (std < settings.max_relative_std * gaze.inverse_distance)
-    boundary = np.float32(gaze.inverse_distance * (1.0 + settings.depth_margin))
-    boundary_variance = np.float32(gaze.inverse_distance_std**2)
-    if support_height_m is not None:
-        surface = _surface_inverse_depth(gaze.T_base_cam, support_height_m + settings.height_margin_m, x, y)
-        boundary_variance = np.where(surface > boundary, np.float32(0.0), boundary_variance)
-        boundary = np.maximum(surface, boundary)
-    p_nearer = ndtr((inverse_depth - boundary) / np.sqrt(variance + boundary_variance)).astype(np.float32)
-    p_nearer[~supported] = 0.5
-    moving = usable & _moves_across(flow, gx, gy, settings)
-    inverse_depth[~supported] = np.nan
+        usable &= ~widened_on_grid(self_mask, shape, 1)
+    question = _question(flow, gaze, settings, support_height_m)
+    answers = pixel_answers(flow, usable, question)
+    cells = evidence_map(answers.p_nearer, answers.supported, answers.moving, settings)
     return ZeroFlow(
-        p_nearer=p_nearer,
-        supported=supported,
-        moving=moving,
-        cells=_cells(p_nearer, supported, moving, settings),
-        inverse_depth=inverse_depth,
-        inverse_depth_std=std,
+        p_nearer=answers.p_nearer,
+        supported=answers.supported,
+        moving=answers.moving,
+        cells=cells,
+        inverse_depth=answers.inverse_depth,
+        inverse_depth_std=answers.inverse_depth_std,
+    )
+
+
+def _question(flow: Flow, gaze: Gaze, settings: ZeroFlowSettings, support_height_m: float | None) -> PixelQuestion:
+    """What every pixel is tested against, in px of the grid and frame intervals."""
+    x, y = _float_grid(flow.intrinsics)
+    gx, gy = epipolar_direction(x, y, gaze.twist[:3])
+    height = None if support_height_m is None else support_height_m + settings.height_margin_m
+    rows, columns = _surface_inverse_depth(gaze.T_base_cam, height, x, y)
+    pose = 0.5 * flow.intrinsics.fx**2  # errors of two poses, motion over two intervals: 2 / 2^2
+    return PixelQuestion(
+        gx=(gx * (flow.intrinsics.fx * flow.period)).astype(np.float32),
+        gy=(gy * (flow.intrinsics.fy * flow.period)).astype(np.float32),
+        warp_inverse_depth=np.float32(flow.warp_inverse_depth),
+        boundary=np.float32(gaze.inverse_distance * (1.0 + settings.depth_margin)),
+        boundary_variance=np.float32(gaze.inverse_distance_std**2),
+        surface_rows=rows,
+        surface_columns=columns,
+        max_std=np.float32(settings.max_relative_std * gaze.inverse_distance),
+        moving_gate=np.float32(settings.moving_gate),
+        least_moving=np.float32(settings.moving_px**2),
+        rotation_noise=np.float32(pose * settings.rotation_std_rad**2),
+        position_noise=np.float32(pose * settings.position_std_m**2),
     )
 
 
@@ -170,95 +149,55 @@ def obstacle_centre(zero_flow: ZeroFlow, intrinsics: Intrinsics) -> tuple[FloatA
     return np.array([(front * x).sum(), (front * y).sum()]) / total, total / front.size
 
 
-def _float_grid(intrinsics: Intrinsics) -> tuple[Float32Array, Float32Array]:
-    """Normalised x of shape (1, w) and y of shape (h, 1)."""
+@lru_cache(maxsize=8)
+def _float_grid(intrinsics: Intrinsics) -> tuple[FloatArray, FloatArray]:
+    """Normalised coordinates x, shape (w,), and y, shape (h,), of the pixels."""
     x, y = intrinsics.grid
-    return x[:1].astype(np.float32), y[:, :1].astype(np.float32)
+    return x[0], y[:, 0]
 
 
-def _displacement_per_inverse_depth(
-    flow: Flow, v: FloatArray, x: Float32Array, y: Float32Array
+def _surface_inverse_depth(
+    T_base_cam: FloatArray, height_m: float | None, x: FloatArray, y: FloatArray
 ) -> tuple[Float32Array, Float32Array]:
-    """Epipolar direction g in px of the grid per frame interval and per 1/m, each of shape (h, w)."""
-    gx, gy = epipolar_direction(x.astype(np.float64), y.astype(np.float64), v)
-    scale_x, scale_y = flow.intrinsics.fx * flow.period, flow.intrinsics.fy * flow.period
-    shape = flow.overlap.shape
-    return (
-        np.broadcast_to((gx * scale_x).astype(np.float32), shape),
-        np.broadcast_to((gy * scale_y).astype(np.float32), shape),
-    )
+    """Inverse depth of a horizontal plane along every ray, 1/m: the sum of a part per row (h,) and per column (w,).
+
+    It is not positive where the ray misses the plane; -inf without a plane or below it.
+    """
+    down = -1.0 if height_m is None else height_m - float(T_base_cam[2, 3])
+    if height_m is None or down >= 0.0:
+        return np.full(y.size, -np.inf, np.float32), np.zeros(x.size, np.float32)
+    a, b, c = (T_base_cam[2, :3] / down).tolist()
+    return (b * y + c).astype(np.float32), (a * x).astype(np.float32)
 
 
-def _pose_noise(flow: Flow, settings: ZeroFlowSettings, inverse_depth: Float32Array | float) -> Float32Array:
-    """Variance of the predicted motion from errors of two poses, px^2 per interval^2."""
-    scale = 0.5 * flow.intrinsics.fx**2  # two poses, motion over two intervals: 2 / 2^2
-    position = np.float32(scale * settings.position_std_m**2) * np.square(inverse_depth)
-    return np.float32(scale * settings.rotation_std_rad**2) + position
-
-
-def _along(
-    flow: Flow, gx: Float32Array, gy: Float32Array, settings: ZeroFlowSettings
-) -> tuple[Float32Array, Float32Array]:
-    """Inverse depth in excess of the warp plane's and its variance, 1/m and 1/m^2, each of shape (h, w)."""
-    j, b = flow.information, flow.gradient
-    information = gx * gx * j[0] + 2.0 * gx * gy * j[1] + gy * gy * j[2]
-    information = np.maximum(information, _LEAST_INFORMATION)
-    excess = -(gx * b[0] + gy * b[1]) / information
-    length = np.maximum(gx * gx + gy * gy, _LEAST_LENGTH)
-    return excess, 1.0 / information + _pose_noise(flow, settings, flow.warp_inverse_depth + excess) / length
-
-
-def _moves_across(flow: Flow, gx: Float32Array, gy: Float32Array, settings: ZeroFlowSettings) -> MaskArray:
-    """Pixels whose residual motion has a significant component across g."""
-    scale = 1.0 / np.sqrt(np.maximum(gx * gx + gy * gy, _LEAST_LENGTH))
-    nx, ny = -gy * scale, gx * scale
-    cov = flow.residual_cov
-    across = nx * flow.residual[0] + ny * flow.residual[1]
-    variance = nx * nx * cov[0] + 2.0 * nx * ny * cov[1] + ny * ny * cov[2]
-    variance = variance + _pose_noise(flow, settings, flow.warp_inverse_depth)
-    squared = across * across
-    return (squared > settings.moving_gate * variance) & (squared > settings.moving_px**2)
-
-
-def _surface_inverse_depth(T_base_cam: FloatArray, height_m: float, x: Float32Array, y: Float32Array) -> Float32Array:
-    """Inverse depth of a horizontal plane along every ray, shape (h, w), 1/m; 0 where the ray misses it."""
-    down = height_m - T_base_cam[2, 3]
-    if down >= 0.0:  # camera below the plane
-        return np.zeros(np.broadcast_shapes(x.shape, y.shape), np.float32)
-    slope = (T_base_cam[2, :3] / down).astype(np.float32)
-    return np.maximum(slope[0] * x + slope[1] * y + slope[2], np.float32(0.0))
-
-
-def _resampled(mask: MaskArray, shape: tuple[int, ...], widen_px: int) -> MaskArray:
+def widened_on_grid(mask: MaskArray, shape: tuple[int, ...], widen_px: int) -> MaskArray:
     """Mask on another grid, widened by some pixels of it; shape (h, w)."""
     grid = mask.view(np.uint8)
     if mask.shape != shape:
-        grid = cv2.resize(grid * np.uint8(255), (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
-    grid = (grid > 0).astype(np.uint8)
-    if widen_px > 0 and grid.any():
-        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * widen_px + 1, 2 * widen_px + 1))
-        grid = np.asarray(cv2.dilate(grid, kernel), np.uint8)
+        grid = _pooled_any(grid, shape)
+    grid = (grid > 0).view(np.uint8)
+    if widen_px > 0:
+        grid = np.asarray(cv2.dilate(grid, _disc(widen_px)), np.uint8)
     return grid.view(np.bool_)
 
 
-def _cells(p_nearer: Float32Array, supported: MaskArray, moving: MaskArray, settings: ZeroFlowSettings) -> ImageArray:
-    """Pool the evidence of pixels into the map; a pixel weighs by how decided it is."""
-    decided = 2.0 * p_nearer - 1.0  # 0 without evidence
-    front = np.maximum(decided, moving.astype(np.float32))
-    behind = np.where(moving, np.float32(0.0), np.maximum(-decided, 0.0))
-    seen = (supported | moving).astype(np.float32)
-    planes = (front, front * front, behind, behind * behind, seen)
-    front, front_squared, behind, behind_squared, seen = (
-        cv2.resize(plane, (CELLS, CELLS), interpolation=cv2.INTER_AREA) for plane in planes
-    )
-    around = cv2.boxFilter(front, cv2.CV_32F, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    bias = np.where(around >= settings.cell_min_front, settings.front_weight, 0.0)
-    evidence = bias * front + behind
-    mean_decided = (bias * front_squared - behind_squared) / np.maximum(evidence, 1e-6)
-    probability = 0.5 + 0.5 * mean_decided
-    known = (seen >= settings.cell_min_share) & (evidence > 0.5 * settings.cell_min_share)
-    return np.where(known, np.rint(255.0 * probability), UNKNOWN).astype(np.uint8)
+@lru_cache(maxsize=8)
+def _disc(radius: int) -> ImageArray:
+    side = 2 * radius + 1
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)), np.uint8)
 
 
-_LEAST_INFORMATION = np.float32(1e-12)
-_LEAST_LENGTH = np.float32(1e-12)
+def _pooled_any(mask: ImageArray, shape: tuple[int, ...]) -> ImageArray:
+    """Positive where any pixel is set, shape (h, w); only the part of the mask that is set is looked at."""
+    step_y, step_x = mask.shape[0] // shape[0], mask.shape[1] // shape[1]
+    if mask.shape != (step_y * shape[0], step_x * shape[1]):
+        return np.asarray(cv2.resize(mask * np.uint8(255), shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)
+    grid = np.zeros(shape, np.uint8)
+    left, top, width, height = cv2.boundingRect(mask)
+    if width and height:
+        rows = slice(top // step_y, (top + height - 1) // step_y + 1)
+        columns = slice(left // step_x, (left + width - 1) // step_x + 1)
+        part = mask[rows.start * step_y : rows.stop * step_y, columns.start * step_x : columns.stop * step_x]
+        size = (columns.stop - columns.start, rows.stop - rows.start)
+        grid[rows, columns] = cv2.resize(part * np.uint8(255), size, interpolation=cv2.INTER_AREA)
+    return grid

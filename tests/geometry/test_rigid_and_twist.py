@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, pose_to_matrix, transform
+from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, pose_to_matrix, rotation_vector, transform
 from fixation_gym.geometry.twist import adjoint, exp_twist, mean_twist, skew
 
 RNG = np.random.default_rng(1)
@@ -73,3 +73,20 @@ def test_look_at_puts_the_target_on_the_optical_axis_with_up_at_the_top():
 def test_look_at_refuses_a_line_of_sight_along_up():
     with pytest.raises(ValueError, match="parallel"):
         look_at(np.zeros(3), np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 1.0]))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-14, 1e-9, 1e-4, 0.3, 1.5, 2.5, 3.1, np.pi - 1e-7, np.pi])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_rotation_vector_is_the_one_of_scipy(angle, seed):
+    axis = np.random.default_rng(seed).normal(size=3) * np.array([1.0, 10.0 * (seed == 1) + 1, 10.0 * (seed == 2) + 1])
+    rotation = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+    ours = rotation_vector(rotation)
+    np.testing.assert_allclose(np.linalg.norm(ours), angle, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(Rotation.from_rotvec(ours).as_matrix(), rotation, atol=1e-12)
+    if angle < np.pi - 1e-9:  # at pi both signs are right
+        np.testing.assert_allclose(ours, Rotation.from_matrix(rotation).as_rotvec(), rtol=1e-7, atol=1e-12)
+
+
+def test_a_zero_quaternion_is_refused():
+    with pytest.raises(ValueError, match="quaternion"):
+        pose_to_matrix(np.zeros(7))

@@ -7,7 +7,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import image_flow
 from fixation_gym.geometry.rigid import inverse
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.perception import optic_flow
+from fixation_gym.perception import gradients
 from fixation_gym.perception.optic_flow import estimate_flow, flow_grid, invalid_flow, plane_homography
 
 CAMERA = Intrinsics.from_fovy(120, 160, np.deg2rad(42.5))
@@ -40,8 +40,8 @@ def flow_of(twist, distance=0.5, noise=2.0, warp=None, seed=0):
 
 def test_filters_are_unit_so_a_ramp_has_slope_one_in_space_and_time():
     for prefilter, derivative in (
-        (optic_flow.SPACE_PREFILTER, optic_flow.SPACE_DERIVATIVE),
-        (optic_flow.TIME_PREFILTER, optic_flow.TIME_DERIVATIVE),
+        (gradients.SPACE_PREFILTER, gradients.SPACE_DERIVATIVE),
+        (gradients.TIME_PREFILTER, gradients.TIME_DERIVATIVE),
     ):
         ramp = np.arange(prefilter.size) - prefilter.size // 2 + 5.0
         assert prefilter @ ramp == pytest.approx(5.0, rel=1e-6)

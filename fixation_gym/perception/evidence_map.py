@@ -1,0 +1,91 @@
+"""The coarse map for policies: evidence of many pixels pooled into 32 x 32 cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from fixation_gym.perception import kernels, pixel_kernels
+from fixation_gym.perception.scratch import Float32Array, fill
+from fixation_gym.types import ImageArray, MaskArray
+
+CELLS = 32
+"""Cells along each side of the map."""
+UNKNOWN = 128
+"""Cell value where there is no evidence; otherwise P(nearer) times 255."""
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroFlowSettings:
+    """Margins and gates of the test."""
+
+    depth_margin: float = 0.05
+    """An obstacle's inverse depth exceeds the fixated one by this share at least."""
+    height_margin_m: float = 0.015
+    """An obstacle rises above the support surface by this much at least, m."""
+    max_relative_std: float = 0.25
+    """A pixel has evidence if its inverse depth is known to this share of the fixated one."""
+    position_std_m: float = 1e-4
+    """Noise of each camera position, m."""
+    rotation_std_rad: float = 2e-4
+    """Noise of each camera orientation, rad."""
+    moving_gate: float = 15.0
+    """Motion across the epipolar line is independent above this chi-square (1 degree of freedom; 99.99 %)."""
+    moving_px: float = 0.25
+    """... and above this motion, px of the flow grid per frame interval."""
+    target_margin_px: int = 3
+    """The target is widened by this much, px of the flow grid: windows at its outline mix it with what is behind."""
+    cell_min_share: float = 0.06
+    """Least share of a cell's pixels that must have evidence."""
+    cell_min_front: float = 0.15
+    """Least front evidence in a cell and its 8 neighbours together, in cells; less is speckle."""
+    front_weight: float = 2.0
+    """Front evidence counts this much more than evidence of the free background in the same cell."""
+
+
+def evidence_map(
+    p_nearer: Float32Array, supported: MaskArray, moving: MaskArray, settings: ZeroFlowSettings
+) -> ImageArray:
+    """Pool the evidence of pixels into the map, shape (32, 32); a pixel weighs by how decided it is.
+
+    Args:
+        p_nearer: of every pixel, shape (h, w); 0.5 without evidence.
+        supported: pixels with evidence, shape (h, w).
+        moving: pixels that move by themselves and count as near, shape (h, w).
+        settings: weights and thresholds.
+    """
+    least_front, weight = np.float32(settings.cell_min_front), np.float32(settings.front_weight)
+    least_share = np.float32(settings.cell_min_share)
+    if kernels.enabled and min(p_nearer.shape) >= CELLS:
+        pooled, values = np.empty((5, CELLS, CELLS), np.float32), np.empty((CELLS, CELLS), np.uint8)
+        pixel_kernels.pooled_evidence(p_nearer, supported, moving, pooled)
+        pixel_kernels.map_values(pooled, least_front, weight, least_share, np.uint8(UNKNOWN), values)
+        return values
+    front, front_squared, behind, behind_squared, seen = _pooled(p_nearer, supported, moving)
+    around = cv2.boxFilter(front, cv2.CV_32F, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    bias = (around >= least_front) * weight
+    evidence = bias * front + behind
+    mean_decided = (bias * front_squared - behind_squared) / np.maximum(evidence, np.float32(1e-6))
+    value = np.rint(np.float32(127.5) + np.float32(127.5) * mean_decided)
+    known = (seen >= least_share) & (evidence > np.float32(0.5) * least_share)
+    return np.where(known, value, np.float32(UNKNOWN)).astype(np.uint8)
+
+
+def _pooled(p_nearer: Float32Array, supported: MaskArray, moving: MaskArray) -> list[Float32Array]:
+    """Means over the cells: evidence in front, its square, behind, its square, pixels seen, each of shape (32, 32)."""
+    decided = np.float32(2.0) * p_nearer - np.float32(1.0)  # 0 without evidence
+    front, behind = np.maximum(decided, np.float32(0.0)), np.maximum(-decided, np.float32(0.0))
+    if moving.any():
+        fill(front, 1.0, moving)
+        fill(behind, 0.0, moving)
+    seen = (supported | moving).astype(np.float32)
+    return [_on_cells(plane) for plane in (front, front * front, behind, behind * behind, seen)]
+
+
+def _on_cells(plane: Float32Array) -> Float32Array:
+    """Means over the cells; by columns first, as OpenCV is quick with whole ratios only."""
+    if plane.shape[0] % CELLS and plane.shape[1] % CELLS == 0:
+        plane = np.asarray(cv2.resize(plane, (CELLS, plane.shape[0]), interpolation=cv2.INTER_AREA), np.float32)
+    return np.asarray(cv2.resize(plane, (CELLS, CELLS), interpolation=cv2.INTER_AREA), np.float32)

@@ -1,0 +1,175 @@
+import hashlib
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from pinhole_scene import Rectangle, Scene, fixating_pose, noise_texture, observe, upright
+from scipy.special import ndtr
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception import Colour, Perception, gradients, kernels, segmentation, zero_flow
+from fixation_gym.perception.evidence_map import evidence_map
+from fixation_gym.perception.pixel_test import normal_distribution
+from fixation_gym.perception.zero_flow import ZeroFlowSettings
+
+FOVY = np.deg2rad(42.5)
+needs_numba = pytest.mark.skipif(not kernels.enabled, reason="numba is not installed")
+
+
+def observations(height, width, steps=5):
+    """Views of a table with a red patch, a fast near post and a wall, from a circling camera."""
+    forward, across = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    scene = Scene(
+        [
+            upright([1.5, 0, 0.3], 2, 2, noise_texture(9)),
+            Rectangle(np.array([0.5, 0, 0]), 0.6 * forward, 2 * across, noise_texture(1, (0.75, 0.6, 0.45)), 0.4),
+            Rectangle(np.array([0.5, 0, 0.001]), 0.03 * forward, 0.03 * across, noise_texture(2, (0.85, 0.08, 0.08))),
+            upright([0.3, 0.05, 0.13], 0.02, 0.06, noise_texture(3, (0.4, 0.6, 0.4))),
+        ]
+    )
+    camera = Intrinsics.from_fovy(height, width, FOVY)
+    for k in range(steps):
+        angle = 0.12 * k
+        pose = fixating_pose([0.1, 0.05 * np.cos(angle), 0.3 + 0.05 * np.sin(angle)], [0.5, 0, 0])
+        yield observe(scene, pose, 0.04 * k, camera)[0]
+
+
+def percepts(height, width, **options):
+    perception = Perception(Intrinsics.from_fovy(height, width, FOVY), **options)
+    return [perception.update(observation) for observation in observations(height, width)]
+
+
+def without_kernels(monkeypatch):
+    monkeypatch.setattr(kernels, "enabled", False)
+
+
+@needs_numba
+@pytest.mark.parametrize(("height", "width"), [(128, 128), (240, 320), (97, 131), (60, 82)])
+@pytest.mark.parametrize("support", [None, 0.0])
+def test_compiled_and_plain_code_say_the_same(height, width, support, monkeypatch):
+    compiled = percepts(height, width, support_height_m=support)[-1]
+    without_kernels(monkeypatch)
+    plain = percepts(height, width, support_height_m=support)[-1]
+    np.testing.assert_array_equal(compiled.segmentation.mask, plain.segmentation.mask)
+    np.testing.assert_allclose(compiled.flow.residual, plain.flow.residual, atol=2e-5)
+    np.testing.assert_allclose(compiled.flow.residual_cov, plain.flow.residual_cov, rtol=1e-4, atol=1e-6)
+    assert (compiled.zfc.supported != plain.zfc.supported).mean() < 1e-4
+    both = compiled.zfc.supported & plain.zfc.supported
+    assert both.mean() > 0.3
+    for name in ("p_nearer", "inverse_depth", "inverse_depth_std"):
+        np.testing.assert_allclose(getattr(compiled.zfc, name)[both], getattr(plain.zfc, name)[both], atol=2e-4)
+    cells = np.abs(compiled.zfc.cells.astype(int) - plain.zfc.cells)
+    assert np.median(cells) == 0
+    assert (cells > 1).mean() < 0.002
+
+
+@needs_numba
+@pytest.mark.parametrize("colour", [segmentation.RED, Colour(120, 20, 0.3, 0.2), Colour(345, 30, 0.5, 0.0)])
+def test_the_compiled_colour_test_is_that_of_opencv_to_the_bit(colour, monkeypatch):
+    green, blue = np.meshgrid(np.arange(256), np.arange(256))
+    for red in (0, 1, 39, 40, 41, 127, 200, 255):
+        image = np.stack([np.full_like(green, red), green, blue], axis=-1).astype(np.uint8)
+        window = slice(0, 256), slice(0, 256)
+        with monkeypatch.context() as context:
+            compiled = segmentation._in_colour_range(image, window, colour)
+            context.setattr(kernels, "enabled", False)
+            np.testing.assert_array_equal(compiled, segmentation._in_colour_range(image, window, colour))
+
+
+@needs_numba
+@pytest.mark.parametrize("shape", [(64, 64), (120, 160), (97, 131), (32, 33)])
+def test_cells_are_area_means_for_every_grid(shape, monkeypatch):
+    rng = np.random.default_rng(0)
+    supported = cv2.resize(rng.random((9, 9)), shape[::-1]) > 0.4
+    p_nearer = np.where(supported, rng.random(shape), 0.5).astype(np.float32)
+    moving = rng.random(shape) > 0.99
+    compiled = evidence_map(p_nearer, supported, moving, ZeroFlowSettings())
+    without_kernels(monkeypatch)
+    plain = evidence_map(p_nearer, supported, moving, ZeroFlowSettings())
+    assert (compiled != plain).mean() < 0.005  # ties in rounding
+
+
+def test_the_normal_distribution_is_that_of_scipy():
+    z = np.concatenate([np.linspace(-40, 40, 4001), [0.0, -0.0, 1e9, -1e9]]).astype(np.float32)
+    np.testing.assert_allclose(normal_distribution(z), ndtr(z.astype(np.float64)), atol=2e-6)
+
+
+def test_an_image_cut_into_strips_has_the_same_gradients(monkeypatch):
+    without_kernels(monkeypatch)
+    smooth, change = np.random.default_rng(1).normal(0, 30, (2, 96, 128)).astype(np.float32)
+    arguments = (smooth, change, 2.0, gradients.FlowSettings(), 2)
+    whole = gradients.gradient_sums(*arguments, gradients.Scratch())
+    monkeypatch.setattr(gradients, "_STRIP_PIXELS", 128 * 22)
+    np.testing.assert_array_equal(gradients.gradient_sums(*arguments, gradients.Scratch()), whole)
+
+
+def test_what_was_handed_out_is_never_overwritten():
+    perception = Perception(Intrinsics.from_fovy(128, 128, FOVY))
+    *before, last = observations(128, 128, 7)
+    for observation in before:
+        percept = perception.update(observation)
+    parts = (percept.flow, percept.zfc, percept.segmentation)
+    arrays = [getattr(part, entry.name) for part in parts for entry in fields(part)]
+    arrays = [array for array in arrays if isinstance(array, np.ndarray)]
+    copies = [array.copy() for array in arrays]
+    perception.update(last)
+    for array, copy in zip(arrays, copies, strict=True):
+        np.testing.assert_array_equal(array, copy)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_searching_a_window_finds_what_searching_the_whole_image_finds(seed, monkeypatch):
+    rng = np.random.default_rng(seed)
+    image = np.full((240, 320, 3), (150, 110, 70), np.uint8)
+    for _ in range(3):
+        centre, radius = tuple(int(c) for c in rng.integers((0, 0), (320, 240))), int(rng.integers(3, 25))
+        cv2.circle(image, centre, radius, (190, 25, 20), int(rng.choice([-1, 3])))
+    camera = Intrinsics.from_fovy(240, 320, FOVY)
+    found = segmentation.segment(image, camera)
+    monkeypatch.setattr(segmentation, "_search_window", lambda rgb, _: tuple(slice(0, n) for n in rgb.shape[:2]))
+    everywhere = segmentation.segment(image, camera)
+    np.testing.assert_array_equal(found.mask, everywhere.mask)
+    np.testing.assert_allclose(found.centroid, everywhere.centroid, atol=1e-12)
+    np.testing.assert_allclose(found.second_moments, everywhere.second_moments, atol=1e-12)
+    assert found.touches_border == everywhere.touches_border
+
+
+@pytest.mark.parametrize("shape", [(120, 160), (64, 64), (48, 65)])
+def test_a_mask_on_the_grid_covers_every_pixel_of_it(shape):
+    mask = np.zeros((240, 320), bool)
+    mask[31:77, 203] = mask[200, 17:23] = True
+    area = cv2.resize(mask.view(np.uint8) * np.uint8(255), shape[::-1], interpolation=cv2.INTER_AREA)
+    np.testing.assert_array_equal(zero_flow.widened_on_grid(mask, shape, 0), area > 0)
+
+
+SCRIPT = """
+import sys
+if "plain" in sys.argv:
+    sys.modules["numba"] = None
+sys.path[:0] = sys.argv[1:3]
+from test_kernels import digest, kernels
+print(digest(), kernels.enabled)
+"""
+
+
+def digest():
+    last = percepts(96, 128)[-1]
+    data = b"".join(array.tobytes() for array in (last.zfc.p_nearer, last.zfc.cells, last.flow.flow, last.flow.cov))
+    return hashlib.sha256(data).hexdigest()
+
+
+@pytest.mark.parametrize("mode", [pytest.param("compiled", marks=needs_numba), "plain"])
+def test_another_process_gets_the_same_bits_and_needs_no_numba(mode, monkeypatch):
+    if mode == "plain":
+        without_kernels(monkeypatch)
+    here = Path(__file__).parent
+    command = [sys.executable, "-c", SCRIPT, str(here), str(here.parent.parent), mode]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    other, enabled = result.stdout.split()
+    assert enabled == str(kernels.enabled)
+    assert other == digest()
