@@ -14,6 +14,7 @@ import numpy as np
 import fixation_gym  # noqa: F401 - registers the environments
 from fixation_gym.envs.config import CONTROL_FREQUENCY
 from fixation_gym.envs.scene import TABLE_HEIGHT
+from fixation_gym.experiments.bench_stages import stages
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import CAMERA_FOVY
@@ -67,6 +68,8 @@ def perception_cases() -> Iterator[Case]:
         yield Case(
             f"perception {label(size)}", _replay(Perception(_camera(size), support_height_m=TABLE_HEIGHT), observations)
         )
+        for name, run in stages(_camera(size), observations):
+            yield Case(f"{name} {label(size)}", run)
         yield Case(f"ServoPolicy.act {label(size)}", _act(size, recorded))
         greys = [cv2.cvtColor(observation.rgb, cv2.COLOR_RGB2GRAY) for observation in observations]
         dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
