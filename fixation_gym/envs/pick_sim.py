@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
 from fixation_gym.envs import contacts, scene_mjcf
-from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, ROBOT_BODIES, build_task
+from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, ROBOT_BODIES, SceneExtension, build_task
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.scene_loader import SceneLoader
 from fixation_gym.geometry.rigid import look_at
@@ -52,9 +52,18 @@ class ArmState:
 class PickSim:
     """MuJoCo simulation of the pick task: reset to a scene, step by a camera twist, read the truth."""
 
-    def __init__(self, control_frequency: int) -> None:
-        """Build and compile the model once; ``reset`` reuses it."""
-        task = build_task(control_frequency)
+    def __init__(
+        self, control_frequency: int, extend: SceneExtension | None = None, posture: FloatArray = POSTURE
+    ) -> None:
+        """Build and compile the model once; ``reset`` reuses it.
+
+        Args:
+            control_frequency: calls of ``step`` per second.
+            extend: adds an experiment's own things to the model.
+            posture: joint angles, shape (7,), rad, with the role of ``POSTURE``.
+        """
+        self._posture = posture
+        task = build_task(control_frequency, extend)
         self.model: Any = task.sim.model._model
         self.data: Any = task.sim.data._data
         self._task = task  # owns model and data
@@ -117,7 +126,7 @@ class PickSim:
 
     def _inverse_kinematics(self, T_base_cam: FloatArray) -> FloatArray:
         """Joint angles that bring the camera to a pose."""
-        joints, error = POSTURE.copy(), np.full(6, np.inf)
+        joints, error = self._posture.copy(), np.full(6, np.inf)
         for _ in range(100):
             self.data.qpos[self._arm] = joints
             mujoco.mj_kinematics(self.model, self.data)
@@ -128,7 +137,7 @@ class PickSim:
             error = np.concatenate([offset, turn])
             if np.linalg.norm(error) < 1e-6:
                 return joints
-            step = joint_velocities(state.jacobian, error, joints, POSTURE, self.joint_limits, posture_gain=0.1)
+            step = joint_velocities(state.jacobian, error, joints, self._posture, self.joint_limits, posture_gain=0.1)
             joints = np.clip(joints + step, self.joint_limits.lower, self.joint_limits.upper)
         if np.linalg.norm(error) > 2e-3:
             raise RuntimeError(f"the arm cannot reach the camera pose at {np.round(T_base_cam[:3, 3], 3).tolist()}")
@@ -166,7 +175,7 @@ class PickSim:
         """Computed-torque joint velocity control with an integrated position reference, N m."""
         model, data = self.model, self.data
         state = self.arm_state()
-        velocity = joint_velocities(state.jacobian, camera_twist, state.joint_pos, POSTURE, self.joint_limits)
+        velocity = joint_velocities(state.jacobian, camera_twist, state.joint_pos, self._posture, self.joint_limits)
         lead = self._joint_command + velocity * model.opt.timestep - state.joint_pos
         self._joint_command = state.joint_pos + np.clip(lead, -_MAX_WINDUP, _MAX_WINDUP)
         mujoco.mj_fullM(model, self._mass, data.qM)

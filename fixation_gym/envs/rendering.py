@@ -19,7 +19,9 @@ from fixation_gym.types import FloatArray, ImageArray
 class View:
     """One camera of the model, rendered off screen at a fixed size. Create lazily: it owns a GL context."""
 
-    def __init__(self, model: Any, camera: str, height: int, width: int, *, full_quality: bool) -> None:
+    def __init__(
+        self, model: Any, camera: str, height: int, width: int, *, full_quality: bool, samples: int = 4
+    ) -> None:
         """Open a GL context.
 
         Args:
@@ -28,11 +30,12 @@ class View:
             height: image rows, px.
             width: image columns, px.
             full_quality: with robot and shadows, for people; otherwise what the wrist camera needs.
+            samples: per pixel; 0 is faster and enough where all edges of interest are inside textures.
         """
         # The context takes its buffer size from the model; a larger one costs time in every frame.
         model.vis.global_.offheight, model.vis.global_.offwidth = height, width
         # Perception needs anti-aliasing: without it static edges flicker and read as motion.
-        model.vis.quality.offsamples = 4
+        model.vis.quality.offsamples = samples
         model.vis.quality.shadowsize = 1024
         self._renderer = mujoco.Renderer(model, height, width)
         self._model = model
