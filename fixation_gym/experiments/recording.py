@@ -80,8 +80,6 @@ class Frame:
     """Believed pose, twist, and centroid of the flat target (``facing_centroid``)."""
     T_base_cam_calibrated: FloatArray
     """Measured pose without the hand-eye error, shape (4, 4)."""
-    image_std: float
-    """Standard deviation of the target's pixels, normalised."""
     touches_border: bool
     twist_cov: FloatArray
     """Covariance of the measured twist, shape (6, 6)."""
@@ -180,9 +178,8 @@ class _Sensors:
         gaze_error = INTRINSICS.project(in_lens) - [INTRINSICS.cx, INTRINSICS.cy]
         return Frame(
             time=time,
-            sighting=Sighting(believed, noise.joint_pos_rad**2 * motions, twist, centroid),
+            sighting=Sighting(believed, noise.joint_pos_rad**2 * motions, twist, centroid, image_std),
             T_base_cam_calibrated=calibrated,
-            image_std=image_std,
             touches_border=touches,
             twist_cov=noise.joint_vel_rad_s**2 * motions + 1e-10 * np.eye(6),
             flow=flow,

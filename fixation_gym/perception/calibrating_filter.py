@@ -1,11 +1,15 @@
 """Distance from camera poses and centroids when the camera's calibration is uncertain, too.
 
-As ``distance_filters`` the state holds the target (alpha, beta, rho), seen from an anchor camera. Here it also holds what
-stays wrong for a whole run: the hand-eye error (translation t, rotation vector r, in the camera frame) and the age tau of
-the image. Their priors come from the calibration; motion tells some of them. Left out, they make a filter sure and wrong.
+As in ``distance_filters`` the unknowns are the target (alpha, beta, rho), seen from an anchor camera. Here they are joined
+by what stays wrong for a whole run: the hand-eye error (translation t, rotation vector r, in the camera frame) and the age
+tau of the image. Their priors come from the calibration; motion tells some of them. Left out, they make a filter sure and
+wrong.
 
-Measurement: with q the target in the believed camera, the image shows q + t + v tau + (r + w tau) x q, projected.
-Value in, value out.
+Measurement: with q the target in the believed camera, the image shows the ray q + t + v tau + (r + w tau) x q.
+
+A Kalman filter on these ten unknowns becomes sure and wrong, too: which of their combinations cannot be told apart depends
+on where it linearises, so a changing estimate seems to tell them apart. Therefore the estimate is the most probable one
+given all frames of a window, linearised at one place. Value in, value out.
 """
 
 from __future__ import annotations
@@ -14,7 +18,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fixation_gym.geometry.twist import skew
 from fixation_gym.types import FloatArray
 
 
@@ -28,20 +31,22 @@ class CalibratingSettings:
     """Standard deviation of the first inverse depth, as a share of it."""
     centroid_std: float = 1e-4
     """Noise of the centroid, normalised image coordinates."""
+    centroid_std_size: float = 0.003
+    """Part of it that grows with the target, as a share of the standard deviation of its pixels."""
     hand_eye_m: float = 0.0
     """Prior of the hand-eye translation error per axis, m."""
     hand_eye_rad: float = 0.0
     """Prior of the hand-eye rotation error per axis, rad."""
     image_age_s: float = 0.0
     """Prior of the age of the image when the pose is read, s."""
-    walk_m: float = 1e-5
-    """Random walk of the target while it is seen, m per square root of a second."""
     lost_walk_m: float = 1e-2
     """Random walk of the target while it is not seen, m per square root of a second."""
     jump_std_m: float = 0.08
     """Size of the sudden displacements to expect: prior of the distance after a restart, m."""
     gate: float = 13.8
     """Largest accepted NIS: 99.9 % of chi-square with 2 degrees of freedom."""
+    window: int = 300
+    """Frames that are kept; then their estimate becomes the prior of a new window."""
     alarm_count: int = 4
     """Consecutive rejected centroids after which the target is taken to have moved and the filter restarts."""
 
@@ -58,11 +63,13 @@ class Sighting:
     """Measured twist [v, w] in the camera frame, shape (6,)."""
     centroid: FloatArray | None
     """Normalised image coordinates of the target, shape (2,); None when it is not seen."""
+    image_std: float = 0.0
+    """Standard deviation of the target's pixels about the centroid, normalised."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibratingState:
-    """Estimate."""
+    """Estimate, and what it rests on."""
 
     T_base_anchor: FloatArray
     """Pose of the anchor camera, shape (4, 4)."""
@@ -70,6 +77,12 @@ class CalibratingState:
     """(alpha, beta, rho, t (3), r (3), tau), shape (10,)."""
     cov: FloatArray
     """Its covariance, shape (10, 10)."""
+    prior_mean: FloatArray
+    """What was known before the window, shape (10,)."""
+    prior_cov: FloatArray
+    """Its covariance, shape (10, 10)."""
+    window: FloatArray
+    """One row per accepted frame, shape (n, ``_ROW``): see ``_row``."""
     nis: float = np.nan
     """Normalised innovation squared of the last centroid, 2 degrees of freedom."""
     rejected: int = 0
@@ -99,8 +112,7 @@ def advance(
     seen = seen and bool(np.all(np.isfinite(sighting.T_base_cam)) and np.all(np.isfinite(sighting.twist)))
     if state is None:
         return _update(_first(sighting, settings), sighting, settings) if seen else None
-    state = _predict(state, max(dt, 0.0), settings, seen)
-    return _update(state, sighting, settings) if seen else replace(state, nis=np.nan)
+    return _update(state, sighting, settings) if seen else _walk(state, max(dt, 0.0), settings)
 
 
 def _first(sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
@@ -108,69 +120,123 @@ def _first(sighting: Sighting, settings: CalibratingSettings) -> CalibratingStat
     assert sighting.centroid is not None
     rho = 1.0 / settings.initial_distance_m
     stds = [1.0, 1.0, settings.initial_relative_std * rho]
-    stds += [settings.hand_eye_m] * 3 + [settings.hand_eye_rad] * 3 + [settings.image_age_s]
+    stds += [max(settings.hand_eye_m, _EXACT)] * 3 + [max(settings.hand_eye_rad, _EXACT)] * 3
+    stds += [max(settings.image_age_s, _EXACT)]
     mean = np.array([*sighting.centroid, rho, *np.zeros(7)])
-    return CalibratingState(np.array(sighting.T_base_cam), mean, np.diag(np.square(stds)))
+    cov = np.diag(np.square(stds))
+    return CalibratingState(np.array(sighting.T_base_cam), mean, cov, mean, cov, np.zeros((0, _ROW)))
 
 
-def _predict(state: CalibratingState, dt: float, settings: CalibratingSettings, seen: bool) -> CalibratingState:
+def _walk(state: CalibratingState, dt: float, settings: CalibratingSettings) -> CalibratingState:
+    """Let the unseen target wander; the window ends, because its frames show where the target was before."""
     alpha, beta, rho = state.mean[:3]
-    walk = settings.walk_m if seen else settings.lost_walk_m
     jacobian = rho * np.array([[1.0, 0.0, -alpha], [0.0, 1.0, -beta], [0.0, 0.0, -rho]])
     cov = state.cov.copy()
-    cov[:3, :3] += walk**2 * dt * jacobian @ jacobian.T
-    return replace(state, cov=cov)
+    cov[:3, :3] += settings.lost_walk_m**2 * dt * jacobian @ jacobian.T
+    return _collapse(replace(state, cov=cov, nis=np.nan))
 
 
-def _in_camera(state: CalibratingState, mean: FloatArray, T_base_cam: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Target in the believed camera times rho, shape (3,), and its derivative by (alpha, beta, rho), shape (3, 3)."""
-    rotation = T_base_cam[:3, :3].T @ state.T_base_anchor[:3, :3]
-    baseline = T_base_cam[:3, :3].T @ (state.T_base_anchor[:3, 3] - T_base_cam[:3, 3])
-    columns = np.column_stack([rotation[:, 0], rotation[:, 1], baseline])
-    return rotation @ [mean[0], mean[1], 1.0] + mean[2] * baseline, columns
+def _collapse(state: CalibratingState) -> CalibratingState:
+    """Make the estimate the prior of a new window."""
+    return replace(state, prior_mean=state.mean, prior_cov=state.cov, window=state.window[:0])
 
 
-def _model(state: CalibratingState, mean: FloatArray, sighting: Sighting) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Expected centroid (2,), its derivative by the state (2, 10) and by the pose noise (2, 6).
+def _row(state: CalibratingState, sighting: Sighting) -> FloatArray:
+    """A frame as a row: rotation and baseline of the anchor in the camera, pose noise, twist, centroid, its size."""
+    assert sighting.centroid is not None
+    rotation = sighting.T_base_cam[:3, :3].T
+    return np.concatenate(
+        [
+            (rotation @ state.T_base_anchor[:3, :3]).ravel(),
+            rotation @ (state.T_base_anchor[:3, 3] - sighting.T_base_cam[:3, 3]),
+            sighting.pose_cov.ravel(),
+            sighting.twist,
+            sighting.centroid,
+            [sighting.image_std],
+        ]
+    )
 
-    Scaling q by rho leaves the image as it is and keeps targets at infinity finite.
+
+def _model(mean: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Innovation (n, 2), and the derivative of the expected centroid by the state (n, 2, 10) and the pose noise (n, 2, 6).
+
+    With z the centroid and s the ray to the target, the measurement is taken as z s_z - s_xy = 0: the noise of the pose,
+    far larger than the one of z, then does not enter the derivatives. Linearised about the expected centroid, innovation
+    and derivative share that noise, and the hand-eye translation drifts by many standard deviations.
     """
-    scaled, columns = _in_camera(state, mean, sighting.T_base_cam)
-    rho, t, r, tau = mean[2], mean[3:6], mean[6:9], mean[9]
-    v, w = sighting.twist[:3], sighting.twist[3:]
-    turn = r + tau * w
-    ray = scaled + rho * (t + tau * v) + np.cross(turn, scaled)
-    by_motion = np.hstack([rho * np.eye(3), -skew(scaled)])
-    by_target = (np.eye(3) + skew(turn)) @ columns
-    by_target[:, 2] += t + tau * v
+    rotation, baseline = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:12]
+    v, w, centroid = rows[:, 48:51], rows[:, 51:54], rows[:, 54:56]
+    rho, t, tau = mean[2], mean[3:6], mean[9]
+    scaled = rotation @ np.array([mean[0], mean[1], 1.0]) + rho * baseline  # q times rho: finite at infinity
+    turn = _skews(mean[6:9] + tau * w)
+    shift = t + tau * v
+    ray = scaled + rho * shift + (turn @ scaled[..., None])[..., 0]
+    by_target = np.concatenate([rotation[:, :, :2], baseline[..., None]], axis=2)
+    by_target = by_target + turn @ by_target
+    by_target[:, :, 2] += shift
+    by_motion = np.concatenate([np.broadcast_to(rho * np.eye(3), turn.shape), -_skews(scaled)], axis=2)
     by_age = rho * v + np.cross(w, scaled)
-    by_state = np.column_stack([by_target, by_motion, by_age])
-    depth = max(ray[2], 1e-3 * rho)
-    image = ray[:2] / depth
-    project = np.array([[1.0, 0.0, -image[0]], [0.0, 1.0, -image[1]]]) / depth
-    return image, project @ by_state, project @ by_motion
+    by_state = np.concatenate([by_target, by_motion, by_age[..., None]], axis=2)
+    project = np.zeros((len(rows), 2, 3))
+    project[:, 0, 0] = project[:, 1, 1] = 1.0
+    project[:, :, 2] = -centroid
+    project /= np.maximum(ray[:, 2], 0.1)[:, None, None]
+    return -(project @ ray[..., None])[..., 0], project @ by_state, project @ by_motion
+
+
+def _skews(vectors: FloatArray) -> FloatArray:
+    """Matrices S with S p = cross(vector, p), shape (n, 3, 3), of vectors of shape (n, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+
+
+def _noise(rows: FloatArray, by_pose: FloatArray, settings: CalibratingSettings) -> FloatArray:
+    """Covariance of the innovations without the one of the state, shape (n, 2, 2)."""
+    variance = settings.centroid_std**2 + (settings.centroid_std_size * rows[:, 56]) ** 2
+    pose_cov = rows[:, 12:48].reshape(-1, 6, 6)
+    return variance[:, None, None] * np.eye(2) + by_pose @ pose_cov @ np.swapaxes(by_pose, 1, 2)
+
+
+def _adjusted(rows: FloatArray, by_pose: FloatArray, weight: FloatArray, innovation: FloatArray) -> FloatArray:
+    """Rows with the poses that explain the innovations best (least squares with errors in all variables)."""
+    pose_cov = rows[:, 12:48].reshape(-1, 6, 6)
+    error = (pose_cov @ np.swapaxes(by_pose, 1, 2) @ weight @ innovation[..., None])[..., 0]
+    rotation, baseline = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:12, None]
+    turn = _skews(error[:, 3:])
+    adjusted = rows.copy()
+    adjusted[:, :9] += (turn @ rotation).reshape(-1, 9)
+    adjusted[:, 9:12] += error[:, :3] + (turn @ baseline)[..., 0]
+    return adjusted
 
 
 def _update(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
-    """Three Gauss-Newton steps; outliers are rejected, and restart the filter when they persist."""
-    expected, jacobian, by_pose = _model(state, state.mean, sighting)
-    noise = settings.centroid_std**2 * np.eye(2) + by_pose @ sighting.pose_cov @ by_pose.T
-    innovation = sighting.centroid - expected
-    nis = float(innovation @ np.linalg.solve(jacobian @ state.cov @ jacobian.T + noise, innovation))
+    """Add a frame to the window and solve it anew; outliers are rejected, and restart the filter when they persist."""
+    row = _row(state, sighting)[None]
+    innovation, jacobian, by_pose = _model(state.mean, row)
+    spread = jacobian[0] @ state.cov @ jacobian[0].T + _noise(row, by_pose, settings)[0]
+    nis = float(innovation[0] @ np.linalg.solve(spread, innovation[0]))
     if nis > settings.gate:
         rejected = state.rejected + 1
         if rejected >= settings.alarm_count:
             return _restart(state, sighting, settings)
         return replace(state, nis=nis, rejected=rejected)
-    mean, gain = state.mean, np.zeros((state.mean.size, 2))
-    for _ in range(3):
-        expected, jacobian, _ = _model(state, mean, sighting)
-        gain = state.cov @ jacobian.T @ np.linalg.inv(jacobian @ state.cov @ jacobian.T + noise)
-        mean = state.mean + gain @ (sighting.centroid - expected - jacobian @ (state.mean - mean))
+    if len(state.window) >= settings.window:
+        state = _collapse(state)
+    window = np.concatenate([state.window, row])
+    mean, cov = state.mean, state.cov
+    prior_information = np.linalg.inv(state.prior_cov)
+    for _ in range(1 if len(window) > 20 else 3):
+        innovation, _, by_pose = _model(mean, window)
+        weight = np.linalg.inv(_noise(window, by_pose, settings))
+        _, jacobian, _ = _model(mean, _adjusted(window, by_pose, weight, innovation))
+        weighted = np.swapaxes(jacobian, 1, 2) @ weight
+        information = prior_information + (weighted @ jacobian).sum(axis=0)
+        vector = (weighted @ innovation[..., None]).sum(axis=0)[:, 0]
+        cov = np.linalg.inv(information)
+        mean = mean + cov @ (vector - prior_information @ (mean - state.prior_mean))
         mean[2] = max(mean[2], MIN_INVERSE_DEPTH)
-    keep = np.eye(mean.size) - gain @ jacobian
-    cov = keep @ state.cov @ keep.T + gain @ noise @ gain.T
-    return CalibratingState(state.T_base_anchor, mean, 0.5 * (cov + cov.T), nis, 0)
+    return replace(state, mean=mean, cov=0.5 * (cov + cov.T), window=window, nis=nis, rejected=0)
 
 
 def _restart(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
@@ -183,13 +249,17 @@ def _restart(state: CalibratingState, sighting: Sighting, settings: CalibratingS
     spread = float(np.hypot(before.robot_std, settings.jump_std_m))
     cov[2, 2] = min(spread * rho**2, settings.initial_relative_std * rho) ** 2
     cov[3:, 3:] = state.cov[3:, 3:]
-    return _update(CalibratingState(fresh.T_base_anchor, mean, cov), sighting, settings)
+    fresh = replace(fresh, mean=mean, cov=cov, prior_mean=mean, prior_cov=cov)
+    return _update(fresh, sighting, settings)
 
 
 def distance_at(state: CalibratingState, sighting: Sighting) -> Distance:
     """Depth of the target now; standard deviations include the momentary noise of the pose. Never NaN, at least 1 cm."""
     mean = state.mean
-    scaled, columns = _in_camera(state, mean, sighting.T_base_cam)
+    rotation = sighting.T_base_cam[:3, :3].T @ state.T_base_anchor[:3, :3]
+    baseline = sighting.T_base_cam[:3, :3].T @ (state.T_base_anchor[:3, 3] - sighting.T_base_cam[:3, 3])
+    scaled = rotation @ [mean[0], mean[1], 1.0] + mean[2] * baseline
+    columns = np.column_stack([rotation[:, 0], rotation[:, 1], baseline])
     q = scaled / mean[2]
     by_target = columns / mean[2]
     by_target[:, 2] -= q / mean[2]
@@ -204,9 +274,7 @@ def distance_at(state: CalibratingState, sighting: Sighting) -> Distance:
     return Distance(max(float(q[2]), MIN_DEPTH_M), stds[0], max(lens_depth, MIN_DEPTH_M), stds[1])
 
 
-def facing_centroid(
-    centroid: FloatArray, second_moments: FloatArray, normal_cam: FloatArray
-) -> FloatArray:
+def facing_centroid(centroid: FloatArray, second_moments: FloatArray, normal_cam: FloatArray) -> FloatArray:
     """Image of a flat target's centre from the centroid of its pixels, shape (2,).
 
     The near half of a slanted target covers more pixels than the far one. With inverse depth
@@ -226,3 +294,7 @@ MIN_INVERSE_DEPTH = 1e-3
 """Targets farther than 1 km are put there, 1/m."""
 MIN_DEPTH_M = 0.01
 """Targets nearer than this, or behind the camera, are reported at this depth, m."""
+_EXACT = 1e-9
+"""Prior of a calibration value that is taken to be exact."""
+_ROW = 57
+"""Numbers that describe a frame of the window."""
