@@ -16,20 +16,12 @@ from fixation_gym.envs.pick_sim import ArmState, PickSim
 from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import SceneSpec, TargetSpec
 from fixation_gym.experiments.duck_print import CARD_PER_WIDTH, TEXTURE_SIZE, card_image
-from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.geometry.rigid import look_at
-from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.experiments.sequence import HOME, IMAGE_SIZE
 from fixation_gym.types import FloatArray, ImageArray
 
 CONTROL_FREQUENCY = 25
-IMAGE_SIZE = (480, 640)
-"""Height and width of the wrist image, px."""
-INTRINSICS = Intrinsics.from_fovy(*IMAGE_SIZE, CAMERA_FOVY)
 POSTURE = np.array([0.0, -1.0, 0.0, -2.4, 0.0, 2.97, 0.785])
 """Joint angles, rad, with the camera looking straight ahead, far from joint limits and singular postures."""
-HOME = look_at(np.array([0.295, 0.0, 0.87]), np.array([1.295, 0.0, 0.87]), np.array([0.0, 0.0, 1.0]))
-"""T_base_home, shape (4, 4): the camera in the middle of its circle; the print faces it."""
-HOME.setflags(write=False)
 _BACKDROP_X, _THICKNESS = 10.0, 0.0005
 
 

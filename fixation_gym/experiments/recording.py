@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -17,7 +16,18 @@ from scipy.spatial.transform import Rotation
 from fixation_gym.control.servo_laws import gaze_rotation
 from fixation_gym.envs import sensors
 from fixation_gym.envs.config import SensorNoise
-from fixation_gym.experiments.distance_rig import HOME, INTRINSICS, PrintRig
+from fixation_gym.experiments.distance_rig import PrintRig
+from fixation_gym.experiments.sequence import (
+    AFTER_JUMP_S,
+    BURN_IN_S,
+    CENTROID_STD_PX,
+    HOME,
+    INTRINSICS,
+    MEASURE_S,
+    Circle,
+    Condition,
+    Motion,
+)
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.perception import calibrating_filter
@@ -28,47 +38,10 @@ from fixation_gym.perception.segmentation import segment
 from fixation_gym.robot import TWIST_LIMITS
 from fixation_gym.types import FloatArray, ImageArray
 
-Motion = Literal["fixation", "translation"]
-
-CYCLE_RATE = 1.0
-"""Angular rate of the circle, rad/s."""
-BURN_IN_S, MEASURE_S, AFTER_JUMP_S = 1.0, 9.0, 2.0
-"""After the onset of motion nothing counts, then errors are measured, then the print jumps and is found again."""
-JUMP_M = 0.05
-_ONSET_S = 0.4
-"""Time to get to full speed."""
 _GAZE_GAIN, _POSITION_GAIN, _TURN_GAIN = 4.0, 2.0, 2.0
 """1/s."""
 _ATTENTION_PX = 64
 """Images are looked at up to this far around where the target was; all of the image when it is lost."""
-
-
-@dataclass(frozen=True)
-class Condition:
-    """What a sequence shows."""
-
-    distance_m: float
-    """From the camera to the print, the same in both motions."""
-    amplitude_m: float
-    """Radius of the circle."""
-    motion: Motion
-    print_width_m: float
-    """Width of the duck."""
-    seed: int
-
-    def print_position(self) -> FloatArray:
-        """Where the print is, in base, shape (3,): on the home axis, at ``distance_m`` from the circling camera."""
-        ahead = self.distance_m
-        if self.motion == "fixation":
-            ahead = math.sqrt(ahead**2 - self.amplitude_m**2)
-        return HOME[:3, 3] + ahead * HOME[:3, 2]
-
-    def jump(self, rng: np.random.Generator) -> FloatArray:
-        """Displacement of the print, in base, shape (3,): up to 4 cm across the axis, as the image allows, rest away."""
-        across = min(0.04, 0.15 * self.distance_m)
-        angle = rng.uniform(0.0, 2.0 * math.pi)
-        local = np.array([across * math.cos(angle), across * math.sin(angle), math.sqrt(JUMP_M**2 - across**2)])
-        return HOME[:3, :3] @ local
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,25 +87,6 @@ class Recording:
         return self.frames[1].time - self.frames[0].time
 
 
-class Circle:
-    """Where the camera should be, in base."""
-
-    def __init__(self, condition: Condition, rng: np.random.Generator) -> None:
-        """Draw phase and sense."""
-        self._amplitude = condition.amplitude_m
-        self._phase = rng.uniform(0.0, 2.0 * math.pi)
-        self._rate = CYCLE_RATE * (1.0 if rng.random() < 0.5 else -1.0)
-
-    def at(self, time: float) -> tuple[FloatArray, FloatArray]:
-        """Position, m, and velocity, m/s, each of shape (3,)."""
-        ramp = min(time / _ONSET_S, 1.0)
-        travelled = 0.5 * ramp * time if time < _ONSET_S else time - 0.5 * _ONSET_S
-        angle = self._phase + self._rate * travelled
-        out = self._amplitude * np.array([math.cos(angle), math.sin(angle), 0.0])
-        along = self._amplitude * self._rate * ramp * np.array([-math.sin(angle), math.cos(angle), 0.0])
-        return HOME[:3, 3] + HOME[:3, :3] @ out, HOME[:3, :3] @ along
-
-
 def filter_settings(noise: SensorNoise, first_guess_m: float, hand_eye: bool = True) -> CalibratingSettings:
     """Settings of the pose filter for a sensor noise preset."""
     return CalibratingSettings(
@@ -142,10 +96,6 @@ def filter_settings(noise: SensorNoise, first_guess_m: float, hand_eye: bool = T
         hand_eye_rad=noise.hand_eye_rad if hand_eye else 0.0,
         image_age_s=noise.image_latency_s,
     )
-
-
-CENTROID_STD_PX = 0.05
-"""Noise of the centroid of a rendered print, px (measured)."""
 
 
 class _Sensors:

@@ -37,6 +37,10 @@ class FlowFilterSettings:
     """Prior of the tangent of the target's slant; the hard filter, which knows none, adds it to its flow noise."""
     jerk: float = 0.05
     """Root of the spectral density of the jerk, m/s^3 per root Hz: A Omega^3 of the motion."""
+    onset_jerk: float = 0.5
+    """The same while the motion starts, m/s^3 per root Hz."""
+    onset_s: float = 0.6
+    """How long the motion starts, s."""
     drift: float = 1e-3
     """Random walk of the inverse depth per root second, as a share of it."""
     gate: float = 13.8
@@ -77,6 +81,8 @@ class FlowFilterState:
     """Share of the last flow samples that failed the gate."""
     suspicious: int = 0
     """Frames in a row with too large a NIS."""
+    age: float = 0.0
+    """Time since the first frame, s."""
 
 
 def initialise(kind: Kind, settings: FlowFilterSettings) -> FlowFilterState:
@@ -114,15 +120,17 @@ def predict(state: FlowFilterState, dt: float, settings: FlowFilterSettings) -> 
         F[12:, 3:6] = dt * skew(n)
         F[12:, 12:] += dt * ((n @ v) * np.eye(3) + np.outer(n, v) - skew(w))
     mean[-1] = max(mean[-1], MIN_INVERSE_DEPTH)
-    return replace(state, mean=mean, cov=F @ state.cov @ F.T + _process_noise(state, dt, settings))
+    cov = F @ state.cov @ F.T + _process_noise(state, dt, settings)
+    return replace(state, mean=mean, cov=cov, age=state.age + dt)
 
 
 def _process_noise(state: FlowFilterState, dt: float, settings: FlowFilterSettings) -> FloatArray:
     """White jerk on the motion, random walk on the depth."""
     motion = 4 if state.kind == "hard" else 6
     d = state.mean[-1]
-    jerks = np.full(motion, settings.jerk * d)
-    jerks[:3] = settings.jerk
+    jerk = settings.onset_jerk if state.age < settings.onset_s else settings.jerk
+    jerks = np.full(motion, jerk * d)
+    jerks[:3] = jerk
     Q = np.zeros_like(state.cov)
     rates, accelerations = np.arange(motion), np.arange(motion, 2 * motion)
     Q[rates, rates] = jerks**2 * dt**3 / 3.0
@@ -170,7 +178,7 @@ def update(
     mean = state.mean + cov @ vector
     mean[-1] = max(mean[-1], MIN_INVERSE_DEPTH)
     suspicious = state.suspicious + 1 if nis / dof > settings.alarm_nis else 0
-    updated = FlowFilterState(state.kind, mean, 0.5 * (cov + cov.T), nis / dof, rejected, suspicious)
+    updated = FlowFilterState(state.kind, mean, 0.5 * (cov + cov.T), nis / dof, rejected, suspicious, state.age)
     return _forget_depth(updated, settings) if suspicious >= settings.alarm_count else updated
 
 

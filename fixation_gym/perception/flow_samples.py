@@ -16,7 +16,7 @@ import numpy as np
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse
 from fixation_gym.perception.flow_distance_filters import FlowSamples
-from fixation_gym.perception.optic_flow import Flow, FlowSettings, estimate_flow, plane_homography
+from fixation_gym.perception.optic_flow import Flow, FlowSettings, estimate_flow, flow_grid, plane_homography
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 FlowName = Literal["gradient", "warped", "dis"]
@@ -30,6 +30,8 @@ _LEAST_STD_PX = 0.1
 """Least standard deviation of a gradient sample, px of the full image per frame."""
 _DIS_STD_PX = 0.2
 """Standard deviation of a DIS sample, px of the full image per frame."""
+_UNKNOWN = 10.0
+"""Standard deviation of a motion about which nothing is known, 1/s."""
 _MARGIN = 40
 """Pixels kept around the target: what the coarsest windows reach."""
 _LARGEST_SIDE = 320
@@ -136,25 +138,29 @@ def _gradient_samples(
     to_first, to_last = (
         plane_homography(inverse(pose) @ poses[1], inverse_distance, camera) for pose in (poses[0], poses[2])
     )
-    single = estimate_flow(floats, times, camera, settings=replace(settings, levels=1))
-    warped = estimate_flow(floats, times, camera, (to_first, to_last), inverse_distance, settings)
+    # The flow needs to know the size of the images only, and takes the principal point for their middle.
+    middle = replace(camera, cx=0.5 * (camera.width - 1), cy=0.5 * (camera.height - 1))
+    single = estimate_flow(floats, times, middle, settings=replace(settings, levels=1))
+    warped = estimate_flow(floats, times, middle, (to_first, to_last), inverse_distance, settings)
+    grid = flow_grid(camera)
     return {
-        "gradient": _at_grid(single, points, std_per_px),
-        "warped": _at_grid(warped, points, std_per_px),
+        "gradient": _at_grid(single, grid, points, std_per_px),
+        "warped": _at_grid(warped, grid, points, std_per_px),
     }
 
 
-def _at_grid(flow: Flow, points: FloatArray, std_per_px: float) -> FlowSamples:
+def _at_grid(flow: Flow, grid: Intrinsics, points: FloatArray, std_per_px: float) -> FlowSamples:
     """Flow at the grid pixels that hold the points, in normalised coordinates."""
-    grid = flow.intrinsics
     columns = np.minimum(points[:, 0] // 2, grid.width - 1).astype(int)
     rows = np.minimum(points[:, 1] // 2, grid.height - 1).astype(int)
     values = flow.flow[rows, columns].astype(np.float64) / [grid.fx, grid.fy]
-    xx, xy, yy = np.moveaxis(flow.cov[rows, columns].astype(np.float64), -1, 0)
-    cov = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2) / grid.fx**2
-    cov = cov + (_LEAST_STD_PX * std_per_px) ** 2 * np.eye(2)
+    xx, xy, yy = np.moveaxis(flow.cov[rows, columns].astype(np.float64) / grid.fx**2, -1, 0)
+    # Single precision can leave the covariance of an edge indefinite: rebuilt from its limited principal values.
+    variances, axes = np.linalg.eigh(np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2))
+    variances = np.clip(variances, 0.0, _UNKNOWN**2) + (_LEAST_STD_PX * std_per_px) ** 2
+    cov = axes @ (variances[..., None] * np.swapaxes(axes, 1, 2)) * (SAMPLE_COUNT / _INDEPENDENT)
     places = grid.normalise(np.column_stack([columns, rows]).astype(np.float64))
-    return FlowSamples(places, values, cov * (SAMPLE_COUNT / _INDEPENDENT))
+    return FlowSamples(places, values, cov)
 
 
 def _dis_samples(
@@ -164,7 +170,7 @@ def _dis_samples(
     points: FloatArray,
     std_per_px: float,
 ) -> FlowSamples:
-    dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     first, middle, last = images
     forward, backward = (
         np.asarray(dis.calc(middle, other, np.zeros((*middle.shape, 2), np.float32))) for other in (last, first)
