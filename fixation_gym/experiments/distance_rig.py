@@ -22,7 +22,8 @@ from fixation_gym.types import FloatArray, ImageArray
 CONTROL_FREQUENCY = 25
 POSTURE = np.array([0.0, -1.0, 0.0, -2.4, 0.0, 2.97, 0.785])
 """Joint angles, rad, with the camera looking straight ahead, far from joint limits and singular postures."""
-_BACKDROP_X, _THICKNESS = 10.0, 0.0005
+_BACKDROP_X, _TILES, _TILE = 10.0, 9, "backdrop_"
+_THICKNESS = 0.0005
 
 
 def _add_print(asset: ET.Element, worldbody: ET.Element) -> None:
@@ -38,8 +39,12 @@ def _add_print(asset: ET.Element, worldbody: ET.Element) -> None:
     ET.SubElement(body, "inertial", {"pos": "0 0 0", "mass": "0.1", "diaginertia": "1e-3 1e-3 1e-3"})
     untouchable = {"contype": "0", "conaffinity": "0", "group": str(scene_mjcf.VISIBLE_GROUP), "type": "box"}
     ET.SubElement(body, "geom", {"name": "print", "material": "print", "size": "0.1 0.1 0.1", **untouchable})
-    wall = {"name": "backdrop", "material": "poster_bricks", "pos": f"{_BACKDROP_X} 0 1.8", "size": "0.05 7 7"}
-    ET.SubElement(worldbody, "geom", wall | untouchable)
+    # A patchwork of plain tiles: an image all over, but half the time of a textured wall.
+    shades = np.random.default_rng(0).uniform(0.25, 0.75, (2 * _TILES, 2 * _TILES))
+    for (row, column), shade in np.ndenumerate(shades):
+        place = f"{_BACKDROP_X} {row - _TILES + 0.5} {column - _TILES + 0.5 + HOME[2, 3]}"
+        tile = {"name": f"{_TILE}{row}_{column}", "pos": place, "size": "0.05 0.5 0.5", "rgba": f"{shade:.3f} " * 3 + "1"}
+        ET.SubElement(worldbody, "geom", tile | untouchable)
 
 
 class PrintRig:
@@ -72,8 +77,9 @@ class PrintRig:
         down = (0.2, 0.1, -1.0)
         self._sim.reset(SceneSpec(target, (), tuple(eye), tuple(eye + axis), down, "table_felt"))
         model = self._sim.model
-        hidden = [geom for geom in range(model.ngeom) if model.geom(geom).name not in ("print", "backdrop")]
-        model.geom_group[hidden] = scene_mjcf.HIDDEN_GROUP
+        names = [model.geom(geom).name for geom in range(model.ngeom)]
+        shown = [name == "print" or name.startswith(_TILE) for name in names]
+        model.geom_group[~np.array(shown)] = scene_mjcf.HIDDEN_GROUP
         half = 0.5 * CARD_PER_WIDTH * print_width
         model.geom_size[self._geom] = [half, half, _THICKNESS]
         self.move_print(print_position)

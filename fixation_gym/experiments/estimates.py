@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.envs.config import SensorNoise
-from fixation_gym.experiments.recording import Frame, Recording, filter_settings
-from fixation_gym.experiments.sequence import CYCLE_RATE, INTRINSICS
+from fixation_gym.experiments.recording import Frame, Recording, filter_settings, pose_estimate
+from fixation_gym.experiments.sequence import CENTROID_STD_PX, CYCLE_RATE, INTRINSICS
 from fixation_gym.geometry.twist import skew
 from fixation_gym.perception import calibrating_filter, distance_filters, flow_distance_filters
 from fixation_gym.perception.distance_filters import DistanceSettings
@@ -20,7 +20,8 @@ from fixation_gym.types import FloatArray
 
 ONSET_TOLERANCE, JUMP_TOLERANCE = 0.03, 0.05
 """Relative errors that count as settled after the onset of motion and after the jump."""
-_GAZE_RATE_SMOOTHING = 0.3
+_GAZE_RATE_FADING = 0.8
+"""Share of a gaze error's rate that still counts in the next frame."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Track:
 def run(recording: Recording, estimator: Estimator, noise: SensorNoise) -> Track:
     """Run one estimator over all frames."""
     if estimator.name == "pose":
-        rows = _pose(recording, noise, estimator.hand_eye)
+        rows = recording.pose_track if estimator.hand_eye else _calibrated_pose(recording, noise)
     elif estimator.name == "pose3":
         rows = _pose3(recording)
     else:
@@ -67,19 +68,14 @@ def run(recording: Recording, estimator: Estimator, noise: SensorNoise) -> Track
     return Track(*np.array(list(rows)).T)
 
 
-def _pose(recording: Recording, noise: SensorNoise, hand_eye: bool) -> Iterator[tuple[float, ...]]:
-    settings = filter_settings(noise, recording.first_guess_m, hand_eye)
+def _calibrated_pose(recording: Recording, noise: SensorNoise) -> Iterator[tuple[float, ...]]:
+    """The pose filter as if the hand-eye calibration had been perfect."""
+    settings = filter_settings(noise, recording.first_guess_m, hand_eye=False)
     state = None
     for frame in recording.frames:
-        sighting = frame.sighting
-        if not hand_eye:
-            sighting = replace(sighting, T_base_cam=frame.T_base_cam_calibrated)
+        sighting = replace(frame.sighting, T_base_cam=frame.T_base_cam_calibrated)
         state = calibrating_filter.advance(state, sighting, recording.period, settings)
-        if state is None:
-            yield (np.nan,) * 5
-            continue
-        now = calibrating_filter.distance_at(state, sighting)
-        yield now.robot, now.robot_std, now.lens, now.lens_std, state.nis / 2.0
+        yield pose_estimate(state, sighting)
 
 
 def _pose3(recording: Recording) -> Iterator[tuple[float, ...]]:
@@ -117,7 +113,7 @@ def _flow(recording: Recording, estimator: Estimator) -> Iterator[tuple[float, .
     for frame in recording.frames:
         if last is not None:
             flow = None if frame.flow is None or estimator.flow is None else frame.flow[estimator.flow]
-            gaze_rate = _smoothed_rate(gaze_rate, last, frame, dt)
+            gaze_rate = _gaze_rate(gaze_rate, last, frame, dt)
             state = flow_distance_filters.update(state, last.sighting.twist, last.twist_cov, flow, settings, gaze_rate)
             state = flow_distance_filters.predict(state, dt, settings)
         depth, std = flow_distance_filters.distance_of(state, frame.sighting.centroid)
@@ -125,12 +121,14 @@ def _flow(recording: Recording, estimator: Estimator) -> Iterator[tuple[float, .
         last = frame
 
 
-def _smoothed_rate(rate: FloatArray, last: Frame, frame: Frame, dt: float) -> FloatArray:
-    """Low-passed rate of the centroid, shape (2,), 1/s."""
+def _gaze_rate(rate: FloatArray, last: Frame, frame: Frame, dt: float) -> FloatArray:
+    """Rate at which the target drifts from where it is held, shape (2,), 1/s: what exceeds noise, fading slowly."""
     before, now = last.sighting.centroid, frame.sighting.centroid
     if before is None or now is None:
         return rate
-    return rate + _GAZE_RATE_SMOOTHING * ((now - before) / dt - rate)
+    noise = np.sqrt(2.0) * CENTROID_STD_PX / (INTRINSICS.fx * dt)
+    excess = np.maximum(((now - before) / dt) ** 2 - (2.0 * noise) ** 2, 0.0)
+    return np.maximum(np.sqrt(excess), _GAZE_RATE_FADING * rate)
 
 
 def assess(recording: Recording, estimator: Estimator, track: Track) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from fixation_gym.experiments.sequence import (
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.perception import calibrating_filter
-from fixation_gym.perception.calibrating_filter import CalibratingSettings, Sighting, facing_centroid
+from fixation_gym.perception.calibrating_filter import CalibratingSettings, CalibratingState, Sighting, facing_centroid
 from fixation_gym.perception.flow_distance_filters import FlowSamples
 from fixation_gym.perception.flow_samples import CutOut, FlowName, sample_flow
 from fixation_gym.perception.segmentation import segment
@@ -72,6 +72,8 @@ class Recording:
 
     condition: Condition
     frames: tuple[Frame, ...]
+    pose_track: tuple[tuple[float, ...], ...]
+    """Per frame what the pose filter, which runs along for the gaze servo, says: the fields of ``Distance``, and NIS."""
     first_guess_m: float
     """Distance with which every estimator starts: off by up to a factor of 2, log-uniform."""
 
@@ -178,18 +180,27 @@ def record(rig: PrintRig, condition: Condition, noise: SensorNoise, rng: np.rand
     sensing = _Sensors(rig, noise, rng)
     jump_at = round((BURN_IN_S + MEASURE_S) / rig.dt)
     frames: list[Frame] = []
+    track: list[tuple[float, ...]] = []
     state, distance, image = None, first_guess, rig.image()
     for step in range(jump_at + round(AFTER_JUMP_S / rig.dt) + 1):
         frame = sensing.measure(step * rig.dt, image, 1.0 / distance)
         frames.append(frame)
         state = calibrating_filter.advance(state, frame.sighting, rig.dt, settings)
-        if state is not None:
-            distance = calibrating_filter.distance_at(state, frame.sighting).robot
+        track.append(pose_estimate(state, frame.sighting))
+        distance = track[-1][0] if state is not None else first_guess
         if step == jump_at:
             rig.move_print(target + condition.jump(rng))
         twist = _command(condition.motion, circle, frame, distance, frames[0], rig.dt)
         image = rig.image(rig.step(twist, noise.image_latency_s))
-    return Recording(condition, tuple(frames), first_guess)
+    return Recording(condition, tuple(frames), tuple(track), first_guess)
+
+
+def pose_estimate(state: CalibratingState | None, sighting: Sighting) -> tuple[float, ...]:
+    """Depth and its standard deviation, for the robot and for the lens, and NIS per degree of freedom; or NaNs."""
+    if state is None:
+        return (math.nan,) * 5
+    now = calibrating_filter.distance_at(state, sighting)
+    return now.robot, now.robot_std, now.lens, now.lens_std, state.nis / 2.0
 
 
 def _command(
@@ -203,7 +214,7 @@ def _command(
     if motion == "translation":
         turn = Rotation.from_matrix(pose[:3, :3].T @ first.sighting.T_base_cam[:3, :3]).as_rotvec()
         return np.clip(np.concatenate([v, _TURN_GAIN * turn]), -TWIST_LIMITS, TWIST_LIMITS)
-    roll = _TURN_GAIN * float(np.clip(-pose[2, 0], -0.5, 0.5))  # x axis back to the horizontal
+    roll = _TURN_GAIN * float(np.clip(pose[2, 0], -0.5, 0.5))  # x axis back to the horizontal
     centroid = np.zeros(2) if frame.sighting.centroid is None else frame.sighting.centroid
     w = gaze_rotation(centroid, _GAZE_GAIN, 1.0 / distance, v, roll)
     return np.clip(np.array([*v, *w, roll]), -TWIST_LIMITS, TWIST_LIMITS)

@@ -31,7 +31,7 @@ class CalibratingSettings:
     """Standard deviation of the first inverse depth, as a share of it."""
     centroid_std: float = 1e-4
     """Noise of the centroid, normalised image coordinates."""
-    centroid_std_size: float = 0.003
+    centroid_std_size: float = 0.0015
     """Part of it that grows with the target, as a share of the standard deviation of its pixels."""
     hand_eye_m: float = 0.0
     """Prior of the hand-eye translation error per axis, m."""
