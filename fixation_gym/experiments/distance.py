@@ -83,7 +83,7 @@ class DistanceConfig:
         }
 
     def cells(self) -> list[Cell]:
-        """All sequences; all conditions of a seed come before the next seed, so that a part of a run shows the whole."""
+        """All sequences. A seed's conditions come before those of the next, so that part of a run shows the whole."""
         cells = []
         for index in range(self.seed_count):
             for distance in QUICK_DISTANCES if self.quick else DISTANCES:
@@ -136,7 +136,9 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     lengths = round(condition.distance_m * 1e4), round(condition.amplitude_m * 1e4)
     rng = np.random.default_rng([condition.seed, *lengths, motion])
     recording = record(_rigs[0], condition, noise, rng)
-    results = [assess(recording, estimator, run(recording, estimator, noise)) for estimator in estimators(cell["motion"])]
+    results = [
+        assess(recording, estimator, run(recording, estimator, noise)) for estimator in estimators(cell["motion"])
+    ]
     errors = [frame.gaze_error_px for frame in recording.frames[recording.measured]]
     value = {
         **cell,
@@ -164,9 +166,7 @@ def close_rigs() -> None:
         _rigs.pop().close()
 
 
-def measure(
-    config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell
-) -> dict[str, Any]:
+def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
     """Run the sequences that a folder does not have yet, and write summary, CSV and figure.
 
     Args:

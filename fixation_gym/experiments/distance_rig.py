@@ -43,7 +43,12 @@ def _add_print(asset: ET.Element, worldbody: ET.Element) -> None:
     shades = np.random.default_rng(0).uniform(0.25, 0.75, (2 * _TILES, 2 * _TILES))
     for (row, column), shade in np.ndenumerate(shades):
         place = f"{_BACKDROP_X} {row - _TILES + 0.5} {column - _TILES + 0.5 + HOME[2, 3]}"
-        tile = {"name": f"{_TILE}{row}_{column}", "pos": place, "size": "0.05 0.5 0.5", "rgba": f"{shade:.3f} " * 3 + "1"}
+        tile = {
+            "name": f"{_TILE}{row}_{column}",
+            "pos": place,
+            "size": "0.05 0.5 0.5",
+            "rgba": f"{shade:.3f} " * 3 + "1",
+        }
         ET.SubElement(worldbody, "geom", tile | untouchable)
 
 
@@ -116,5 +121,3 @@ class PrintRig:
     def close(self) -> None:
         """Free the GL context; may be called twice."""
         self._view.close()
-
-

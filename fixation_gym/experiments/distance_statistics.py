@@ -113,7 +113,9 @@ def errors_of(results: Sequence[Row], truth: str) -> Row:
         "std_m": spread,
         "mae_m": means["absolute"],
         "mae_median_m": median(own),
-        "mae_sem_m": float(np.std([v for v in own if v is not None], ddof=1) / np.sqrt(len(own))) if n and len(own) > 1 else None,
+        "mae_sem_m": float(np.std([v for v in own if v is not None], ddof=1) / np.sqrt(len(own)))
+        if n and len(own) > 1
+        else None,
         "stated_std_m": means["std"],
         "nees": means["nees"],
         "samples": n,
@@ -195,7 +197,18 @@ _CONDITION = ("distance_m", "amplitude_m", "motion", "estimator", "hand_eye_erro
 
 def format_table(summary: dict[str, Any]) -> str:
     """The pose filter's rows as plain text, and the paper's filter beside it, in mm."""
-    header = ("distance", "circle", "motion", "pose mm", "bound mm", "NEES", "1 s %", "jump 1 s %", "hard mm", "free mm")
+    header = (
+        "distance",
+        "circle",
+        "motion",
+        "pose mm",
+        "bound mm",
+        "NEES",
+        "1 s %",
+        "jump 1 s %",
+        "hard mm",
+        "free mm",
+    )
     lines = ["  ".join(f"{name:>10}" for name in header)]
     rows = {tuple(row[name] for name in (*_CONDITION, "flow")): row for row in summary["rows"]}
     for key, row in rows.items():

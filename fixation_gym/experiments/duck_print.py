@@ -44,7 +44,7 @@ def duck_mask(size: int) -> MaskArray:
 
 
 def card_image() -> ImageArray:
-    """Texture of the print, shape (TEXTURE_SIZE, TEXTURE_SIZE, 3), top-left origin; the duck's centroid is its centre."""
+    """Texture of the print, square, RGB, top-left origin; the duck's centroid is in its middle."""
     fine = TEXTURE_SIZE * _SUPERSAMPLE
     duck = duck_mask(round(fine / CARD_PER_WIDTH))
     rows, columns = np.nonzero(duck)

@@ -37,7 +37,7 @@ class Estimator:
 
 
 def estimators(motion: str) -> tuple[Estimator, ...]:
-    """Those that make sense for a motion: without rotation the fixation constraint says that the target is at infinity."""
+    """Those that make sense: without rotation the fixation constraint would put the target at infinity."""
     kinds = ("hard", "free") if motion == "fixation" else ("free",)
     on_flow = tuple(Estimator(kind, flow) for kind in kinds for flow in FLOW_NAMES)
     return (*on_flow, Estimator("pose"), Estimator("pose", hand_eye=False), Estimator("pose3"))

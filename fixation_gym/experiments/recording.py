@@ -73,7 +73,7 @@ class Recording:
     condition: Condition
     frames: tuple[Frame, ...]
     pose_track: tuple[tuple[float, ...], ...]
-    """Per frame what the pose filter, which runs along for the gaze servo, says: the fields of ``Distance``, and NIS."""
+    """Per frame what the pose filter says, which runs along for the gaze servo: see ``pose_estimate``."""
     first_guess_m: float
     """Distance with which every estimator starts: off by up to a factor of 2, log-uniform."""
 
@@ -203,9 +203,7 @@ def pose_estimate(state: CalibratingState | None, sighting: Sighting) -> tuple[f
     return now.robot, now.robot_std, now.lens, now.lens_std, state.nis / 2.0
 
 
-def _command(
-    motion: Motion, circle: Circle, frame: Frame, distance: float, first: Frame, dt: float
-) -> FloatArray:
+def _command(motion: Motion, circle: Circle, frame: Frame, distance: float, first: Frame, dt: float) -> FloatArray:
     """Camera twist for the next period, shape (6,)."""
     position, _ = circle.at(frame.time)
     _, velocity = circle.at(frame.time + 0.5 * dt)

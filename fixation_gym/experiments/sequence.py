@@ -53,7 +53,7 @@ class Condition:
         return HOME[:3, 3] + ahead * HOME[:3, 2]
 
     def jump(self, rng: np.random.Generator) -> FloatArray:
-        """Displacement of the print, in base, shape (3,): up to 4 cm across the axis, as the image allows, rest away."""
+        """Displacement of the print, in base, shape (3,): up to 4 cm across the axis, the rest away."""
         across = min(0.04, 0.15 * self.distance_m)
         angle = rng.uniform(0.0, 2.0 * math.pi)
         local = np.array([across * math.cos(angle), across * math.sin(angle), math.sqrt(JUMP_M**2 - across**2)])

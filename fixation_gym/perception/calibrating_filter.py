@@ -1,15 +1,15 @@
 """Distance from camera poses and centroids when the camera's calibration is uncertain, too.
 
-As in ``distance_filters`` the unknowns are the target (alpha, beta, rho), seen from an anchor camera. Here they are joined
-by what stays wrong for a whole run: the hand-eye error (translation t, rotation vector r, in the camera frame) and the age
-tau of the image. Their priors come from the calibration; motion tells some of them. Left out, they make a filter sure and
-wrong.
+As in ``distance_filters`` the unknowns are the target (alpha, beta, rho), seen from an anchor camera. Here they are
+joined by what stays wrong for a whole run: the hand-eye error (translation t, rotation vector r, in the camera frame)
+and the age tau of the image. Their priors come from the calibration; motion tells some of them. Left out, they make a
+filter sure and wrong.
 
 Measurement: with q the target in the believed camera, the image shows the ray q + t + v tau + (r + w tau) x q.
 
-A Kalman filter on these ten unknowns becomes sure and wrong, too: which of their combinations cannot be told apart depends
-on where it linearises, so a changing estimate seems to tell them apart. Therefore the estimate is the most probable one
-given all frames of a window, linearised at one place. Value in, value out.
+A Kalman filter on these ten unknowns becomes sure and wrong, too: which of their combinations cannot be told apart
+depends on where it linearises, so a changing estimate seems to tell them apart. Therefore the estimate is the most
+probable one given all frames of a window, linearised at one place. Value in, value out.
 """
 
 from __future__ import annotations
@@ -87,6 +87,8 @@ class CalibratingState:
     """Normalised innovation squared of the last centroid, 2 degrees of freedom."""
     rejected: int = 0
     """Consecutive centroids that failed the gate."""
+    last_pose: FloatArray | None = None
+    """Last finite camera pose, shape (4, 4); stands in for one that is not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +111,15 @@ def advance(
     Frames with a pose, twist or centroid that is not finite count as frames in which nothing was seen.
     """
     seen = sighting.centroid is not None and bool(np.all(np.isfinite(sighting.centroid)))
-    seen = seen and bool(np.all(np.isfinite(sighting.T_base_cam)) and np.all(np.isfinite(sighting.twist)))
+    numbers = (sighting.T_base_cam, sighting.pose_cov, sighting.twist, sighting.image_std)
+    seen = seen and all(bool(np.all(np.isfinite(number))) for number in numbers)
+    if state is None and not seen:
+        return None
     if state is None:
-        return _update(_first(sighting, settings), sighting, settings) if seen else None
-    return _update(state, sighting, settings) if seen else _walk(state, max(dt, 0.0), settings)
+        state = _update(_first(sighting, settings), sighting, settings)
+    else:
+        state = _update(state, sighting, settings) if seen else _walk(state, max(dt, 0.0), settings)
+    return replace(state, last_pose=sighting.T_base_cam) if np.all(np.isfinite(sighting.T_base_cam)) else state
 
 
 def _first(sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
@@ -158,11 +165,11 @@ def _row(state: CalibratingState, sighting: Sighting) -> FloatArray:
 
 
 def _model(mean: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Innovation (n, 2), and the derivative of the expected centroid by the state (n, 2, 10) and the pose noise (n, 2, 6).
+    """Innovation (n, 2), derivative of the expected centroid by the state (n, 2, 10) and by the pose noise (n, 2, 6).
 
-    With z the centroid and s the ray to the target, the measurement is taken as z s_z - s_xy = 0: the noise of the pose,
-    far larger than the one of z, then does not enter the derivatives. Linearised about the expected centroid, innovation
-    and derivative share that noise, and the hand-eye translation drifts by many standard deviations.
+    With z the centroid and s the ray to the target, the measurement is taken as z s_z - s_xy = 0: the noise of the
+    pose, far larger than the one of z, then does not enter the derivatives. Linearised about the expected centroid,
+    innovation and derivative share that noise, and the hand-eye translation drifts by many standard deviations.
     """
     rotation, baseline = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:12]
     v, w, centroid = rows[:, 48:51], rows[:, 51:54], rows[:, 54:56]
@@ -254,10 +261,13 @@ def _restart(state: CalibratingState, sighting: Sighting, settings: CalibratingS
 
 
 def distance_at(state: CalibratingState, sighting: Sighting) -> Distance:
-    """Depth of the target now; standard deviations include the momentary noise of the pose. Never NaN, at least 1 cm."""
+    """Depth of the target now, finite and at least 1 cm; standard deviations include the pose's momentary noise."""
     mean = state.mean
-    rotation = sighting.T_base_cam[:3, :3].T @ state.T_base_anchor[:3, :3]
-    baseline = sighting.T_base_cam[:3, :3].T @ (state.T_base_anchor[:3, 3] - sighting.T_base_cam[:3, 3])
+    pose, pose_cov = sighting.T_base_cam, sighting.pose_cov
+    if not (np.all(np.isfinite(pose)) and np.all(np.isfinite(pose_cov))):
+        pose, pose_cov = state.T_base_anchor if state.last_pose is None else state.last_pose, np.zeros((6, 6))
+    rotation = pose[:3, :3].T @ state.T_base_anchor[:3, :3]
+    baseline = pose[:3, :3].T @ (state.T_base_anchor[:3, 3] - pose[:3, 3])
     scaled = rotation @ [mean[0], mean[1], 1.0] + mean[2] * baseline
     columns = np.column_stack([rotation[:, 0], rotation[:, 1], baseline])
     q = scaled / mean[2]
@@ -266,7 +276,7 @@ def distance_at(state: CalibratingState, sighting: Sighting) -> Distance:
     robot = np.zeros(10)
     robot[:3] = by_target[2]
     momentary = np.array([0.0, 0.0, 1.0, q[1], -q[0], 0.0])  # of q_z by pose noise: t_z + (r x q)_z
-    pose_variance = float(momentary @ sighting.pose_cov @ momentary)
+    pose_variance = float(momentary @ pose_cov @ momentary)
     lens = robot.copy()
     lens[3:9] = momentary
     lens_depth = float(q[2] + mean[5] + np.cross(mean[6:9], q)[2])

@@ -5,8 +5,8 @@ of ``geometry.interaction``). Flow u at (x, y) is u = d A v + B w.
 
 * ``HARD`` has 9 states [v (3), w_Z, a (3), alpha_Z, d] and knows that the fixated point stands still in the image, so
   w_X = d v_Y and w_Y = -d v_X: the distance is the ratio of translation and rotation, flow only checks it.
-* ``FREE`` has 15 states [v (3), w (3), a (3), alpha (3), n (3)] and no constraint. n is the target's plane, n . P = 1, so
-  the inverse depth at (x, y) is n . (x, y, 1), exact for any slant, and n_dot = (n . v) n - w x n.
+* ``FREE`` has 15 states [v (3), w (3), a (3), alpha (3), n (3)] and no constraint. n is the target's plane, n . P = 1,
+  so the inverse depth at (x, y) is n . (x, y, 1), exact for any slant, and n_dot = (n . v) n - w x n.
 
 Units: m, rad, s; twists in the camera frame, image coordinates normalised. Value in, value out.
 """
@@ -20,7 +20,7 @@ import numpy as np
 
 from fixation_gym.geometry.interaction import rotation_part, translation_part
 from fixation_gym.geometry.twist import skew
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, MaskArray
 
 Kind = Literal["hard", "free"]
 
@@ -165,12 +165,13 @@ def update(
     h, H = _twist_model(state)
     noise = np.array(twist_cov, dtype=np.float64)
     if state.kind == "hard" and gaze_rate is not None:
-        noise[[3, 4], [3, 4]] += np.square(gaze_rate[::-1])
+        noise[[3, 4], [3, 4]] += _DRIFT_FRAMES * np.square(gaze_rate[::-1])
     information = np.linalg.inv(noise)
     residual = twist - h
     nis = float(residual @ np.linalg.solve(noise + H @ state.cov @ H.T, residual))
     normal, vector, dof, rejected = H.T @ information @ H, H.T @ information @ residual, 6, 0.0
-    if samples is not None and (finite := np.isfinite(samples.flow).all(axis=1)).any():
+    finite = None if samples is None else np.asarray(np.isfinite(samples.flow).all(axis=1), np.bool_)
+    if samples is not None and finite is not None and finite.any():
         flow_normal, flow_vector, flow_nis, used, rejected = _flow_information(state, samples, finite, settings)
         normal, vector, nis, dof = normal + flow_normal, vector + flow_vector, nis + flow_nis, dof + 2 * used
     inflation = 4.0 if rejected > 0.5 else 1.0
@@ -216,7 +217,7 @@ def _flow_model(state: FlowFilterState, points: FloatArray) -> tuple[FloatArray,
 
 
 def _flow_information(
-    state: FlowFilterState, samples: FlowSamples, finite: FloatArray, settings: FlowFilterSettings
+    state: FlowFilterState, samples: FlowSamples, finite: MaskArray, settings: FlowFilterSettings
 ) -> tuple[FloatArray, FloatArray, float, int, float]:
     """Information matrix and vector of the samples, their NIS, how many count, and the share that failed the gate."""
     points, cov = samples.points[finite], samples.cov[finite]
@@ -269,5 +270,7 @@ def distance_of(state: FlowFilterState, centroid: FloatArray | None = None) -> t
     return 1.0 / d, float(np.sqrt(variance)) / d**2
 
 
+_DRIFT_FRAMES = 10
+"""A gaze error lasts for about this many frames, so it counts as so many independent ones."""
 MIN_INVERSE_DEPTH = 1e-3
 """Objects farther than 1 km are put there, 1/m."""

@@ -7,6 +7,7 @@ if all were in the fixated plane, so that only the residual is differentiated; `
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -29,11 +30,15 @@ _INDEPENDENT = 10
 _LEAST_STD_PX = 0.1
 """Least standard deviation of a gradient sample, px of the full image per frame."""
 _DIS_STD_PX = 0.2
-"""Standard deviation of a DIS sample, px of the full image per frame."""
+"""Standard deviation of a DIS sample across an edge, px of the full image per frame."""
+_WINDOW = 9
+"""Side of the window that tells the direction of an edge, px."""
 _UNKNOWN = 10.0
 """Standard deviation of a motion about which nothing is known, 1/s."""
 _MARGIN = 40
 """Pixels kept around the target: what the coarsest windows reach."""
+_MAX_GAP_S = 0.15
+"""Frames farther apart than this are not differentiated, s."""
 _LARGEST_SIDE = 320
 """Larger cut-outs are halved, px."""
 
@@ -60,13 +65,14 @@ def sample_flow(
     """Flow at ``SAMPLE_COUNT`` edge points of the target in the middle one of three frames; None if it has no edges.
 
     Args:
-        frames: consecutive cut-outs, at constant intervals.
+        frames: consecutive cut-outs; frames that are missing or out of order leave no flow.
         intrinsics: of the full image.
         inverse_distance: of the plane for the warp, 1/m.
         rng: chooses the points.
     """
+    gaps = np.diff([frame.time for frame in frames])
     window = _common_window(frames, intrinsics)
-    if window is None:
+    if window is None or not np.all((gaps > 0.0) & (gaps < _MAX_GAP_S)):
         return None
     left, top, right, bottom = window
     images = [_part(frame.grey, frame.corner, window) for frame in frames]
@@ -77,21 +83,19 @@ def sample_flow(
     if max(mask.shape) > _LARGEST_SIDE:
         height, width = mask.shape[0] // 2, mask.shape[1] // 2
         camera = camera.scaled(height, width)
-        images = [np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)) for image in images]
-        mask = np.asarray(cv2.resize(mask, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
+        images = [_resized(image, width, height, cv2.INTER_AREA) for image in images]
+        mask = _resized(mask, width, height, cv2.INTER_NEAREST)
     points = _edge_points(mask, rng)
     if points is None:
         return None
-    std_per_px = 1.0 / (intrinsics.fx * (frames[2].time - frames[1].time))
+    std_per_px = 2.0 / (intrinsics.fx * (frames[2].time - frames[0].time))
     return {
         **_gradient_samples(frames, images, camera, inverse_distance, points, std_per_px),
         "dis": _dis_samples(frames, images, camera, points, std_per_px),
     }
 
 
-def _common_window(
-    frames: tuple[CutOut, CutOut, CutOut], intrinsics: Intrinsics
-) -> tuple[int, int, int, int] | None:
+def _common_window(frames: tuple[CutOut, CutOut, CutOut], intrinsics: Intrinsics) -> tuple[int, int, int, int] | None:
     """(left, top, right, bottom) around the middle target and inside all three cut-outs, of even size."""
     middle = frames[1]
     columns, rows = np.flatnonzero(middle.mask.any(axis=0)), np.flatnonzero(middle.mask.any(axis=1))
@@ -112,6 +116,10 @@ def _part(image: ImageArray, corner: tuple[int, int], window: tuple[int, int, in
     return np.ascontiguousarray(image[top - corner[1] : bottom - corner[1], left - corner[0] : right - corner[0]])
 
 
+def _resized(image: ImageArray, width: int, height: int, interpolation: int) -> ImageArray:
+    return np.asarray(cv2.resize(image, (width, height), interpolation=interpolation), np.uint8)
+
+
 def _edge_points(mask: ImageArray, rng: np.random.Generator) -> FloatArray | None:
     """Columns and rows of random pixels on the outline, shape (n, 2); None if there are hardly any."""
     outline = cv2.morphologyEx(mask, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
@@ -120,12 +128,12 @@ def _edge_points(mask: ImageArray, rng: np.random.Generator) -> FloatArray | Non
     if rows.size < 8:
         return None
     chosen = rng.choice(rows.size, SAMPLE_COUNT, replace=rows.size < SAMPLE_COUNT)
-    return np.column_stack([columns[chosen], rows[chosen]])
+    return np.column_stack([columns[chosen], rows[chosen]]).astype(np.float64)
 
 
 def _gradient_samples(
     frames: tuple[CutOut, CutOut, CutOut],
-    images: list[ImageArray],
+    images: Sequence[ImageArray],
     camera: Intrinsics,
     inverse_distance: float,
     points: FloatArray,
@@ -165,12 +173,12 @@ def _at_grid(flow: Flow, grid: Intrinsics, points: FloatArray, std_per_px: float
 
 def _dis_samples(
     frames: tuple[CutOut, CutOut, CutOut],
-    images: list[ImageArray],
+    images: Sequence[ImageArray],
     camera: Intrinsics,
     points: FloatArray,
     std_per_px: float,
 ) -> FlowSamples:
-    dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
     first, middle, last = images
     forward, backward = (
         np.asarray(dis.calc(middle, other, np.zeros((*middle.shape, 2), np.float32))) for other in (last, first)
@@ -178,5 +186,21 @@ def _dis_samples(
     columns, rows = points[:, 0].astype(int), points[:, 1].astype(int)
     displacement = (forward - backward)[rows, columns].astype(np.float64)
     values = displacement / (frames[2].time - frames[0].time) / [camera.fx, camera.fy]
-    variance = (_DIS_STD_PX * std_per_px) ** 2 * SAMPLE_COUNT / _INDEPENDENT
-    return FlowSamples(camera.normalise(points.astype(np.float64)), values, np.tile(variance * np.eye(2), (len(points), 1, 1)))
+    std = _DIS_STD_PX * std_per_px
+    cov = std**2 * SAMPLE_COUNT / _INDEPENDENT * _edge_shape(middle)[rows, columns]
+    return FlowSamples(camera.normalise(points), values, cov)
+
+
+def _edge_shape(grey: ImageArray) -> FloatArray:
+    """Covariance shape of a motion seen through a small window, shape (h, w, 2, 2): 1 across an edge, large along it.
+
+    DIS states no uncertainty, and at an edge it finds little more than the motion across it.
+    """
+    image = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 1.0)
+    ix, iy = cv2.Scharr(image, cv2.CV_32F, 1, 0), cv2.Scharr(image, cv2.CV_32F, 0, 1)
+    xx, xy, yy = (cv2.blur(product, (_WINDOW, _WINDOW)).astype(np.float64) for product in (ix * ix, ix * iy, iy * iy))
+    strength = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy**2) + 1e-9
+    least = 1e-4 * strength
+    determinant = (xx + least) * (yy + least) - xy**2
+    inverse_tensor = np.stack([np.stack([yy + least, -xy], -1), np.stack([-xy, xx + least], -1)], -2)
+    return inverse_tensor * (strength / determinant)[..., None, None]
