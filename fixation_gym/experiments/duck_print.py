@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.types import FloatArray, ImageArray, MaskArray
+from fixation_gym.types import ImageArray, MaskArray
 
 TEXTURE_SIZE = 1024
 """Side of the square texture, px."""
@@ -55,11 +57,13 @@ def card_image() -> ImageArray:
     return np.rint(share * np.array(_RED) + (1.0 - share) * np.array(_CARD)).astype(np.uint8)
 
 
-def duck_extent() -> FloatArray:
-    """Largest distance of the duck's outline from its centroid along x and y, in widths, shape (2,)."""
+@cache
+def duck_extent() -> tuple[float, float]:
+    """Largest distance of the duck's outline from its centroid along x and y, in widths."""
     rows, columns = np.nonzero(duck_mask(256))
-    across = max(columns.max() - columns.mean(), columns.mean() - columns.min())
-    return np.array([across, max(rows.max() - rows.mean(), rows.mean() - rows.min())]) / 256.0
+    along_x = max(columns.max() - columns.mean(), columns.mean() - columns.min())
+    along_y = max(rows.max() - rows.mean(), rows.mean() - rows.min())
+    return float(along_x) / 256.0, float(along_y) / 256.0
 
 
 def valid_widths(distance_m: float, intrinsics: Intrinsics, shift_m: float = 0.0) -> tuple[float, ...]:
@@ -72,7 +76,7 @@ def valid_widths(distance_m: float, intrinsics: Intrinsics, shift_m: float = 0.0
     """
     image_width = intrinsics.width * distance_m / intrinsics.fx
     half_image = np.array([image_width, intrinsics.height * distance_m / intrinsics.fy]) / 2
-    extent = duck_extent()
+    extent = np.array(duck_extent())
     return tuple(
         width
         for width in WIDTHS

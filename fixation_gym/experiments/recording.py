@@ -31,7 +31,8 @@ from fixation_gym.experiments.sequence import (
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.perception import calibrating_filter
-from fixation_gym.perception.calibrating_filter import CalibratingSettings, CalibratingState, Sighting, facing_centroid
+from fixation_gym.perception.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
+from fixation_gym.perception.flat_target import facing_centroid
 from fixation_gym.perception.flow_distance_filters import FlowSamples
 from fixation_gym.perception.flow_samples import CutOut, FlowName, sample_flow
 from fixation_gym.perception.segmentation import segment

@@ -14,8 +14,8 @@ from fixation_gym.perception.calibrating_filter import (
     Sighting,
     advance,
     distance_at,
-    facing_centroid,
 )
+from fixation_gym.perception.flat_target import facing_centroid
 
 DT = 0.04
 POSE_COV = np.diag([1e-4] * 3 + [2e-4] * 3) ** 2
