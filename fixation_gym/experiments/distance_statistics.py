@@ -73,6 +73,7 @@ def _row(key: tuple[Any, ...], members: Sequence[tuple[Cell, Row]], noise: str) 
         "nees_high": high,
         "nees_consistent": robot["nees"] is not None and low <= robot["nees"] <= high,
         "mae_lens_m": lens["mae_m"],
+        "mae_median_lens_m": lens["mae_median_m"],
         "bias_lens_m": lens["bias_m"],
         "nees_lens": lens["nees"],
         "nis_per_dof": mean(result["nis"] for result in results),
