@@ -108,6 +108,39 @@ class Evaluate:
 
 
 @dataclass(frozen=True)
+class Distance:
+    """Error of the distance against distance, fixating and only translating. The same command again resumes."""
+
+    quick: bool = False
+    """Six distances and two seeds instead of thirteen and twenty."""
+    seeds: int | None = None
+    """Sequences per distance, amplitude and motion; 20 by default, 2 with --quick."""
+    seed: int = 0
+    """Chooses the block of seeds: sequence i has seed 100000 * SEED + i."""
+    noise: str = "conservative"
+    """Sensor noise: ideal, nominal or conservative."""
+    workers: int = 1
+    """Number of processes."""
+    out: Path = Path("out/distance")
+    """Folder of the results."""
+
+    def run(self) -> int:
+        """Measure and print the table."""
+        from fixation_gym.experiments.distance import CSV_FILE, FIGURE_FILE, DistanceConfig, measure
+
+        config = DistanceConfig(self.quick, self.seeds, self.seed, self.noise, self.workers)
+        config.check()
+        select_backend()
+        from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.distance_statistics import format_table
+
+        summary = measure(config, self.out)
+        print(format_table(summary))
+        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, FIGURE_FILE)))
+        return 0
+
+
+@dataclass(frozen=True)
 class Bench:
     """Time every stage and comparable environments in one run: table of medians, ratios and a bar chart."""
 
@@ -155,6 +188,7 @@ class Doctor:
 Commands = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
@@ -212,5 +246,5 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"fixation-gym: error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("fixation-gym: interrupted; finished episodes are kept", file=sys.stderr)
+        print("fixation-gym: interrupted; what was finished is kept", file=sys.stderr)
         return 130

@@ -21,6 +21,7 @@ REQUIRED = (
     "joblib",
     "tqdm",
     "tyro",
+    "matplotlib",
 )
 OPTIONAL = ("torch", "stable-baselines3", "tensorboard", "ray")
 HEADLESS_CV2 = "opencv-python-headless"

@@ -19,9 +19,10 @@ FORBIDDEN = {
         "torch",
         "fixation_gym.envs",
         "fixation_gym.control",
+        "fixation_gym.experiments",
     ),
     "policies/servo": ("gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.envs", "fixation_gym.evaluation"),
-    "fixation_gym/envs": ("torch", "fixation_gym.evaluation", "policies"),
+    "fixation_gym/envs": ("torch", "fixation_gym.evaluation", "fixation_gym.experiments", "policies"),
 }
 FORBIDDEN["fixation_gym/geometry"] += ("fixation_gym.control", "fixation_gym.envs")
 FORBIDDEN["fixation_gym/control"] += ("fixation_gym.envs",)

@@ -17,7 +17,7 @@ import numpy as np
 from fixation_gym.control.computed_torque import ArmDynamics, ArmTask, arm_torques, camera_kinematics
 from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
 from fixation_gym.envs import contacts, scene_mjcf
-from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, ROBOT_BODIES, build_task
+from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, ROBOT_BODIES, SceneExtension, build_task
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.scene_loader import SceneLoader
 from fixation_gym.geometry.rigid import look_at
@@ -48,9 +48,18 @@ class ArmState:
 class PickSim:
     """MuJoCo simulation of the pick task: reset to a scene, step by a camera twist, read the truth."""
 
-    def __init__(self, control_frequency: int) -> None:
-        """Build and compile the model once; ``reset`` reuses it."""
-        task = build_task(control_frequency)
+    def __init__(
+        self, control_frequency: int, extend: SceneExtension | None = None, posture: FloatArray = POSTURE
+    ) -> None:
+        """Build and compile the model once; ``reset`` reuses it.
+
+        Args:
+            control_frequency: calls of ``step`` per second.
+            extend: adds an experiment's own things to the model.
+            posture: joint angles, shape (7,), rad, with the role of ``POSTURE``.
+        """
+        self._posture = posture
+        task = build_task(control_frequency, extend)
         self.model: Any = task.sim.model._model
         self.data: Any = task.sim.data._data
         self._robosuite_task = task  # owns model and data
@@ -72,7 +81,7 @@ class PickSim:
         limits = model.jnt_range[:7]
         self._task = ArmTask(
             HAND_EYE,
-            POSTURE,
+            posture,
             JointLimits(limits[:, 0] + 0.02, limits[:, 1] - 0.02, JOINT_SPEED),
             model.actuator_ctrlrange[:7].copy(),
             model.opt.timestep,
@@ -139,7 +148,7 @@ class PickSim:
     def _inverse_kinematics(self, T_base_cam: FloatArray) -> FloatArray:
         """Joint angles that bring the camera to a pose."""
         limits = self._task.limits
-        joints, error = POSTURE.copy(), np.full(6, np.inf)
+        joints, error = self._posture.copy(), np.full(6, np.inf)
         for iteration in range(100):
             self.data.qpos[self._arm] = joints
             mujoco.mj_kinematics(self.model, self.data)
@@ -152,7 +161,7 @@ class PickSim:
             if np.linalg.norm(error) < 1e-6:
                 return joints
             posture_gain = 0.5 if iteration < 6 else 0.0  # the drift slows the convergence that then follows
-            step = joint_velocities(state.jacobian, error, joints, POSTURE, limits, 1e-3, posture_gain, 1.0)
+            step = joint_velocities(state.jacobian, error, joints, self._posture, limits, 1e-3, posture_gain, 1.0)
             joints = np.clip(joints + step, limits.lower, limits.upper)
         if np.linalg.norm(error) > 2e-3:
             raise RuntimeError(f"the arm cannot reach the camera pose at {np.round(T_base_cam[:3, 3], 3).tolist()}")

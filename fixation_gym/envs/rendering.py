@@ -16,14 +16,13 @@ import numpy as np
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.types import FloatArray, ImageArray
 
-_SUPERSAMPLING = 2
-"""Pixels rendered per pixel of an observation, along each side."""
-
 
 class View:
     """One camera of the model, rendered off screen at a fixed size. Create lazily: it owns a GL context."""
 
-    def __init__(self, model: Any, camera: str, height: int, width: int, *, full_quality: bool) -> None:
+    def __init__(
+        self, model: Any, camera: str, height: int, width: int, *, full_quality: bool, supersampling: int = 2
+    ) -> None:
         """Open a GL context.
 
         Args:
@@ -32,11 +31,13 @@ class View:
             height: image rows, px.
             width: image columns, px.
             full_quality: with robot and shadows, for people; otherwise what the wrist camera needs.
+            supersampling: pixels rendered per pixel of the image along each side, without ``full_quality``; 1 is faster
+                and enough where all edges of interest are inside textures.
         """
         # Perception needs anti-aliasing: without it static edges flicker and read as motion. In software GL, twice the
         # resolution averaged down costs less than four samples per pixel; people get both samples and shadows.
         self._size = (height, width)
-        factor = 1 if full_quality else _SUPERSAMPLING
+        factor = 1 if full_quality else supersampling
         fine = (factor * height, factor * width)
         # The context takes these from the model; a larger buffer costs time in every frame.
         model.vis.global_.offheight, model.vis.global_.offwidth = fine

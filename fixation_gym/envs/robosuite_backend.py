@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from typing import Any
 
 from fixation_gym.envs import scene_mjcf
@@ -25,10 +26,16 @@ _TABLE_OFFSET = (0.0, 0.0, 0.8)
 ROBOT_BODIES = ("robot0_", "gripper0_", "fixed_mount0_")
 """Beginnings of the names of the robot's bodies."""
 BASE_BODY, HAND_BODY = "robot0_link0", "robot0_right_hand"
+SceneExtension = Callable[[ET.Element, ET.Element], None]
+"""Adds an experiment's own things to the MJCF elements ``asset`` and ``worldbody``."""
 
 
 class _FixationPickTask(ManipulationEnv):
     """robosuite task: Panda at a table with the object pool. Only builds the model; ``PickSim`` steps it."""
+
+    def __init__(self, extend: SceneExtension | None, **options: Any) -> None:
+        self._extend = extend  # the base class loads the model
+        super().__init__(**options)
 
     def _load_model(self) -> None:
         super()._load_model()
@@ -43,6 +50,8 @@ class _FixationPickTask(ManipulationEnv):
         scene_mjcf.add_wrist_camera(hand)
         scene_mjcf.add_object_pool(worldbody)
         scene_mjcf.add_background(worldbody, _TABLE_OFFSET)
+        if self._extend is not None:
+            self._extend(self.model.asset, worldbody)
         scene_mjcf.draw_last(worldbody, ("floor", "wall", "board"))
         ET.SubElement(self.model.contact, "exclude", {"body1": BASE_BODY, "body2": "robot0_link1"})
 
@@ -51,9 +60,10 @@ class _FixationPickTask(ManipulationEnv):
         return 0.0
 
 
-def build_task(control_frequency: int) -> Any:
+def build_task(control_frequency: int, extend: SceneExtension | None = None) -> Any:
     """Build the task once; its ``sim`` holds model and data. It is reset and stepped by ``PickSim``."""
     return _FixationPickTask(
+        extend,
         robots="Panda",
         has_offscreen_renderer=False,
         use_camera_obs=False,

@@ -1,6 +1,7 @@
-"""Result folders: one line per finished episode, so that a killed run resumes where it stopped.
+"""Result folders: one line per finished piece of work, so that a killed run resumes where it stopped.
 
-``run.json`` says what the run is, ``episodes.jsonl`` has one finished episode per line, ``summary.json`` the outcome.
+``run.json`` says what the run is, ``episodes.jsonl`` (or another such file) has one finished piece per line,
+``summary.json`` the outcome.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ import fcntl
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.rollout import EpisodeResult
@@ -24,6 +25,10 @@ SUMMARY_FILE = "summary.json"
 
 EpisodeKey = tuple[str, int]
 """(scenario, seed)"""
+
+Key = TypeVar("Key", bound=Hashable)
+Result = TypeVar("Result")
+Store = TypeVar("Store", bound="ResultStore[Any, Any]")
 
 
 def make_folder(folder: Path) -> None:
@@ -89,32 +94,45 @@ def write_json(path: Path, value: Any) -> None:
         temporary.unlink(missing_ok=True)
 
 
-class EpisodeStore:
-    """The finished episodes of one run, in memory and in its folder. Use as a context manager.
+class ResultStore(Generic[Key, Result]):
+    """The finished pieces of one run, in memory and in its folder. Use as a context manager.
 
     Attributes:
         folder: where the files are.
-        finished: results by (scenario, seed), in the order in which they were stored.
+        finished: results by key, in the order in which they were stored.
     """
 
-    def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        run: Mapping[str, Any],
+        file: str,
+        key: Callable[[Result], Key],
+        from_json: Callable[[Any], Result],
+        to_json: Callable[[Result], Any],
+    ) -> None:
         """Start a run in a folder, or resume the one that is there.
 
         Args:
             folder: is made if needed.
-            run: JSON-able description of everything the results depend on, except scenario and seed of the episodes.
+            run: JSON-able description of everything the results depend on, except their keys.
+            file: name of the file of results.
+            key: tells results apart.
+            from_json: makes a result of a line; raises ValueError or TypeError if the line is damaged.
+            to_json: the reverse.
 
         Raises:
             UsageError: if the folder cannot be written, is in use, or holds another run or a damaged file.
         """
         make_folder(folder)
         self.folder = folder
+        self._path, self._key, self._from_json, self._to_json = folder / file, key, from_json, to_json
         with contextlib.ExitStack() as opened:
             opened.enter_context(folder_lock(folder))
-            check_no_folders(folder, (RUN_FILE, EPISODES_FILE, SUMMARY_FILE))
+            check_no_folders(folder, (RUN_FILE, file, SUMMARY_FILE))
             try:
-                _check_run(folder, run)
-                self._file = opened.enter_context((folder / EPISODES_FILE).open("a+b"))
+                _check_run(self._path, run)
+                self._file = opened.enter_context(self._path.open("a+b"))
                 self.finished = self._read()
                 if not (folder / RUN_FILE).exists():
                     write_json(folder / RUN_FILE, dict(run))
@@ -122,7 +140,7 @@ class EpisodeStore:
                 raise UsageError(f"cannot use the results in {folder} ({error}); choose another --out") from error
             self._opened = opened.pop_all()
 
-    def __enter__(self) -> EpisodeStore:
+    def __enter__(self: Store) -> Store:
         return self
 
     def __exit__(
@@ -130,45 +148,59 @@ class EpisodeStore:
     ) -> None:
         self._opened.close()
 
-    def append(self, result: EpisodeResult) -> None:
-        """Store a finished episode; it is on the disk when this returns."""
-        self._file.write(json.dumps(result.to_json(), allow_nan=False).encode() + b"\n")
+    def append(self, result: Result) -> None:
+        """Store a finished piece; it is on the disk when this returns."""
+        self._file.write(json.dumps(self._to_json(result), allow_nan=False).encode() + b"\n")
         self._file.flush()
         os.fsync(self._file.fileno())
-        self.finished[(result.scenario, result.seed)] = result
+        self.finished[self._key(result)] = result
 
-    def _read(self) -> dict[EpisodeKey, EpisodeResult]:
-        """Read all episodes, and cut off a last line that a kill tore."""
+    def _read(self) -> dict[Key, Result]:
+        """Read all results, and cut off a last line that a kill tore."""
         self._file.seek(0)
-        finished: dict[EpisodeKey, EpisodeResult] = {}
+        finished: dict[Key, Result] = {}
         lines = self._file.read().splitlines(keepends=True)
         good = 0
         for number, line in enumerate(lines, start=1):
-            result = _parse(line)
+            result = self._parse(line)
             if result is None:
                 if number == len(lines):
                     break
-                raise UsageError(f"{self.folder / EPISODES_FILE}, line {number} is damaged; choose another --out")
-            finished.setdefault((result.scenario, result.seed), result)
+                raise UsageError(f"{self._path}, line {number} is damaged; choose another --out")
+            finished.setdefault(self._key(result), result)
             good += len(line)
         self._file.truncate(good)
         return finished
 
+    def _parse(self, line: bytes) -> Result | None:
+        if not line.endswith(b"\n"):
+            return None  # every stored line was written together with its end
+        with contextlib.suppress(ValueError, TypeError):
+            return self._from_json(json.loads(line))
+        return None
 
-def _parse(line: bytes) -> EpisodeResult | None:
-    if not line.endswith(b"\n"):
-        return None  # every stored line was written together with its end
-    with contextlib.suppress(ValueError, TypeError):
-        return EpisodeResult.from_json(json.loads(line))
-    return None
+
+class EpisodeStore(ResultStore[EpisodeKey, EpisodeResult]):
+    """The finished episodes of one run, by (scenario, seed)."""
+
+    def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
+        """Start or resume a run; see ``ResultStore``. ``run`` leaves out scenario and seed of the episodes."""
+        super().__init__(
+            folder,
+            run,
+            EPISODES_FILE,
+            key=lambda result: (result.scenario, result.seed),
+            from_json=EpisodeResult.from_json,
+            to_json=EpisodeResult.to_json,
+        )
 
 
-def _check_run(folder: Path, run: Mapping[str, Any]) -> None:
+def _check_run(results: Path, run: Mapping[str, Any]) -> None:
+    folder = results.parent
     path = folder / RUN_FILE
     if not path.exists():
-        episodes = folder / EPISODES_FILE
-        if episodes.exists() and episodes.stat().st_size > 0:
-            raise UsageError(f"{folder} has {EPISODES_FILE} but no {RUN_FILE}; choose another --out")
+        if results.exists() and results.stat().st_size > 0:
+            raise UsageError(f"{folder} has {results.name} but no {RUN_FILE}; choose another --out")
         return
     try:
         stored = dict(json.loads(path.read_text(encoding="utf-8")))

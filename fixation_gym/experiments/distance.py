@@ -1,0 +1,222 @@
+"""The paper's Fig. 3b: error of the distance against distance, fixating and only translating. Resumable."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast, get_args
+
+import numpy as np
+from tqdm import tqdm
+
+from fixation_gym.doctor import installed_versions
+from fixation_gym.errors import UsageError, check_names
+from fixation_gym.evaluation import workers
+from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders, write_json
+from fixation_gym.experiments.distance_statistics import summarise, write_csv
+from fixation_gym.experiments.duck_print import valid_widths
+from fixation_gym.experiments.sequence import INTRINSICS, Condition, Motion
+
+if TYPE_CHECKING:
+    from fixation_gym.experiments.distance_rig import PrintRig
+
+DISTANCES = (0.066, 0.097, 0.15, 0.21, 0.31, 0.45, 0.66, 0.97, 1.4, 2.0, 3.1, 4.5, 6.6)
+"""m, evenly spaced in the logarithm but for the paper's 0.15 and 2."""
+QUICK_DISTANCES = (0.066, 0.15, 0.31, 0.66, 2.0, 6.6)
+AMPLITUDES = (0.02, 0.05)
+"""Radii of the circle, m."""
+LARGE_AMPLITUDE_FROM = 0.15
+"""Nearest distance for the larger circle, m."""
+SEQUENCES_FILE, CSV_FILE, FIGURE_FILE = "sequences.jsonl", "rows.csv", "distance.png"
+
+Cell = dict[str, Any]
+Key = tuple[float, float, str, int]
+"""(distance, amplitude, motion, seed)"""
+
+
+@dataclass(frozen=True)
+class DistanceConfig:
+    """What to measure, and with how many processes."""
+
+    quick: bool = False
+    """Fewer distances, two seeds, and one amplitude per distance: the largest."""
+    seeds: int | None = None
+    """Sequences per distance, amplitude and motion; None for 20, or 2 if quick."""
+    seed: int = 0
+    noise: str = "conservative"
+    workers: int = 1
+
+    def check(self) -> None:
+        """Check everything that can be checked without the simulator.
+
+        Raises:
+            UsageError: naming the first bad value and what is allowed.
+        """
+        from fixation_gym.envs.config import SENSOR_NOISE
+
+        check_names([self.noise], SENSOR_NOISE, "sensor noise")
+        if self.seed < 0:
+            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
+        if not 1 <= self.seed_count <= SEED_BLOCK:
+            raise UsageError(f"--seeds must be within 1..{SEED_BLOCK}, got {self.seeds}")
+        workers.check_backend("loky", self.workers)
+
+    @property
+    def seed_count(self) -> int:
+        """Sequences per distance, amplitude and motion."""
+        return self.seeds if self.seeds is not None else 2 if self.quick else 20
+
+    def run_description(self) -> dict[str, Any]:
+        """Everything the result of one sequence depends on, apart from its key."""
+        return {
+            "command": "distance",
+            "seed": self.seed,
+            "noise": self.noise,
+            "gl": os.environ.get("MUJOCO_GL"),
+            "versions": installed_versions(),
+        }
+
+    def cells(self) -> list[Cell]:
+        """All sequences. A seed's conditions come before those of the next, so that part of a run shows the whole."""
+        cells = []
+        for index in range(self.seed_count):
+            for distance in QUICK_DISTANCES if self.quick else DISTANCES:
+                amplitudes = [a for a in AMPLITUDES if a == AMPLITUDES[0] or distance >= LARGE_AMPLITUDE_FROM]
+                for amplitude in amplitudes[-1:] if self.quick else amplitudes:
+                    for motion in get_args(Motion):
+                        cells.append(self._cell(distance, amplitude, motion, index))
+        return cells
+
+    def _cell(self, distance: float, amplitude: float, motion: Motion, index: int) -> Cell:
+        # Without rotation the print wanders through the image by the amplitude.
+        widths = valid_widths(distance, INTRINSICS, amplitude if motion == "translation" else 0.0)
+        return {
+            "distance_m": distance,
+            "amplitude_m": amplitude,
+            "motion": motion,
+            "print_width_m": widths[index % len(widths)],
+            "seed": self.seed * SEED_BLOCK + index,
+            "noise": self.noise,
+        }
+
+
+def cell_key(cell: Cell) -> Key:
+    """What tells the results of one run apart."""
+    return cell["distance_m"], cell["amplitude_m"], cell["motion"], cell["seed"]
+
+
+_rigs: list[PrintRig] = []  # at most one: it is large
+
+
+def run_cell(cell: Cell) -> dict[str, Any]:
+    """Record the sequence of a cell and run every estimator on it; returns the cell with ``results`` and ``bounds``."""
+    from fixation_gym.gl import select_backend
+
+    select_backend()
+    import cv2
+
+    from fixation_gym.envs.config import SENSOR_NOISE
+    from fixation_gym.experiments.distance_rig import PrintRig
+    from fixation_gym.experiments.estimates import assess, bounds, estimators, run
+    from fixation_gym.experiments.recording import record
+    from fixation_gym.experiments.sequence import CENTROID_STD_PX
+
+    cv2.setNumThreads(1)  # images are small: threads cost more than they gain
+    if not _rigs:
+        _rigs.append(PrintRig())
+    condition = Condition(**{name: value for name, value in cell.items() if name != "noise"})
+    noise = SENSOR_NOISE[cell["noise"]]
+    motion = get_args(Motion).index(condition.motion)
+    lengths = round(condition.distance_m * 1e4), round(condition.amplitude_m * 1e4)
+    rng = np.random.default_rng([condition.seed, *lengths, motion])
+    recording = record(_rigs[0], condition, noise, rng)
+    results = [
+        assess(recording, estimator, run(recording, estimator, noise)) for estimator in estimators(cell["motion"])
+    ]
+    errors = [frame.gaze_error_px for frame in recording.frames[recording.measured]]
+    value = {
+        **cell,
+        "results": results,
+        "bounds": bounds(recording, CENTROID_STD_PX / INTRINSICS.fx),
+        "gaze_error_px": float(np.mean(errors)),
+        "visible": float(np.mean([frame.sighting.centroid is not None for frame in recording.frames])),
+    }
+    return cast("dict[str, Any]", _without_nan(value))
+
+
+def _without_nan(value: Any) -> Any:
+    """None for numbers that are not finite, as JSON needs it."""
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+@atexit.register
+def close_rigs() -> None:
+    """Close the rig that ``run_cell`` keeps alive in this process."""
+    while _rigs:
+        _rigs.pop().close()
+
+
+def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
+    """Run the sequences that a folder does not have yet, and write summary, CSV and figure.
+
+    Args:
+        config: must have passed ``check``.
+        out: folder; made if needed.
+        run: runs one cell; tests replace it.
+
+    Returns:
+        The summary, as in ``summary.json``.
+
+    Raises:
+        UsageError: if the folder cannot be used.
+    """
+    from fixation_gym.experiments.distance_figure import draw_figure
+
+    started = time.monotonic()
+    cells = config.cells()
+    store: ResultStore[Key, dict[str, Any]] = ResultStore(
+        out, config.run_description(), SEQUENCES_FILE, key=cell_key, from_json=_checked, to_json=dict
+    )
+    with store:
+        check_no_folders(out, (CSV_FILE, FIGURE_FILE))
+        missing = [cell for cell in cells if cell_key(cell) not in store.finished]
+        progress = tqdm(total=len(cells), initial=len(cells) - len(missing), unit="sequence", dynamic_ncols=True)
+        with closing(progress), closing(workers.run_cells(missing, config.workers, "loky", run)) as values:
+            for value in values:
+                store.append(value)
+                progress.update()
+                progress.set_postfix_str(f"{value['distance_m']:g} m, {value['motion']}")
+        close_rigs()
+        summary = {
+            **summarise([store.finished[cell_key(cell)] for cell in cells], config.noise),
+            **config.run_description(),
+            "quick": config.quick,
+            "seeds": config.seed_count,
+            "sequences_resumed": len(cells) - len(missing),
+            "wall_s": time.monotonic() - started,
+        }
+        write_json(out / SUMMARY_FILE, summary)
+        write_csv(out / CSV_FILE, summary["rows"])
+        draw_figure(out / FIGURE_FILE, summary["rows"])
+    return summary
+
+
+def _checked(value: Any) -> dict[str, Any]:
+    """A stored sequence.
+
+    Raises:
+        ValueError: if something of it is missing.
+    """
+    if not isinstance(value, dict) or not {"distance_m", "amplitude_m", "motion", "seed", "results"} <= set(value):
+        raise ValueError("not a sequence")
+    return value
