@@ -160,6 +160,7 @@ def test_bad_actions_are_refused_with_what_is_allowed(env, action):
         ({"render_mode": "ansi"}, "rgb_array"),
         ({"render_view": "top"}, "overlay"),
         ({"reward": "huge"}, "dense"),
+        ({"image_size": None, "render_view": "overlay"}, "needs an image_size"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_is_built(arguments, message):

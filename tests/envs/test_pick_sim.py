@@ -81,6 +81,20 @@ def test_the_fast_view_shows_what_the_view_in_full_quality_shows(scenario):
     env.close()
 
 
+def test_without_an_image_size_the_rest_of_the_observation_is_the_same():
+    envs = [gym.make("FixationPick-v0", image_size=size, sensor_noise="ideal") for size in (None, (48, 64))]
+    for env in envs:
+        env.reset(seed=1)
+    action = np.array([0.2, 0.1, 0.3, 0.0, 0.1, 0.0, -1.0], np.float32)
+    blind, seeing = (env.step(action)[0] for env in envs)
+    assert set(seeing) - set(blind) == {"rgb"}
+    assert blind in envs[0].observation_space
+    for key, value in blind.items():
+        np.testing.assert_array_equal(value, seeing[key], err_msg=key)
+    for env in envs:
+        env.close()
+
+
 def test_resting_objects_sleep_and_wake_at_a_touch():
     env = gym.make("FixationPick-v0", image_size=None).unwrapped
     env.reset(seed=0)

@@ -1,0 +1,46 @@
+"""The benchmark's bookkeeping on made-up cases; the real ones are timed by the command itself."""
+
+from itertools import count
+
+import pytest
+
+from fixation_gym.experiments import bench
+from fixation_gym.experiments.bench_cases import Case
+from fixation_gym.experiments.bench_figure import draw_figure
+
+
+def test_cases_are_interleaved_and_every_call_is_timed(monkeypatch):
+    order, clock = [], count()
+    monkeypatch.setattr(bench.time, "perf_counter", lambda: float(next(clock)))  # every call takes one second
+    cases = [Case(name, lambda name=name: order.append(name)) for name in ("a", "b")]
+    rows = bench.measure(cases, rounds=3)
+    assert order[-6:] == ["a", "b"] * 3
+    assert [row["name"] for row in rows] == ["a", "b"]
+    assert all(row["calls"] == 3 and row["ms_median"] == 1000.0 for row in rows)
+
+
+def test_ratios_need_both_sides_and_know_their_direction():
+    def rows(**times):
+        return [{"name": name.replace("_", " "), "ms_median": ms, "ms_p95": ms} for name, ms in times.items()]
+
+    ratios = bench.ratios_of(rows(lift_step_128x128=40.0, step_128x128=4.0, flow_640x480=3.0))
+    assert list(ratios) == ["robosuite Lift step / ours, 128x128 image"]
+    assert next(iter(ratios.values())) == {"value": 10.0, "goal": 10.0, "at_most": False, "met": True}
+    slow = bench.ratios_of([*rows(flow_640x480=3.0), {"name": "DIS ultrafast 640x480", "ms_median": 2.0, "ms_p95": 2}])
+    assert slow["optic flow / DIS ultrafast, 640x480"]["value"] == pytest.approx(1.5)
+    assert not slow["optic flow / DIS ultrafast, 640x480"]["met"]
+
+
+def test_the_chart_is_a_picture_that_grows_with_the_rows(tmp_path):
+    import cv2
+
+    heights = []
+    for rows in (3, 12):
+        draw_figure(
+            tmp_path / "bench.png", [{"name": f"case {i}", "ms_median": 1.0, "ms_p95": 2.0} for i in range(rows)]
+        )
+        image = cv2.imread(str(tmp_path / "bench.png"))
+        assert image is not None
+        assert image.std() > 10
+        heights.append(image.shape[0])
+    assert heights[1] > heights[0] + 150
