@@ -4,7 +4,7 @@
 VENV := .venv/bin
 ARGS :=
 
-.PHONY: demo test test-core lint evaluate doctor core full lock clean
+.PHONY: demo test test-core lint evaluate bench doctor core full lock clean
 
 demo: core
 	$(VENV)/fixation-gym demo $(ARGS)
@@ -23,6 +23,10 @@ lint: full
 evaluate: core
 	$(VENV)/fixation-gym evaluate $(ARGS)
 
+bench: core  # with the peers it compares to
+	$(VENV)/uv pip install --quiet --constraint constraints.txt --editable '.[bench]'
+	$(VENV)/fixation-gym bench $(ARGS)
+
 doctor: core
 	$(VENV)/fixation-gym doctor
 
@@ -34,7 +38,7 @@ core full:
 lock: full
 	cp constraints.txt constraints.tmp || true
 	sed -n 's/^TORCH_VERSION=/torch==/p' scripts/bootstrap.sh | $(VENV)/uv pip compile pyproject.toml --constraint - \
-	    --universal --python-version 3.10 --extra rl --extra dev --no-emit-package setuptools \
+	    --universal --python-version 3.10 --extra rl --extra bench --extra dev --no-emit-package setuptools \
 	    --no-annotate --no-header --quiet --output-file constraints.tmp >/dev/null
 	{ echo "# All versions, for Python 3.10 to 3.12 and every extra. Regenerate with: make lock"; \
 	  grep -v -e "'never'" -e '^#' constraints.tmp; } >constraints.txt
