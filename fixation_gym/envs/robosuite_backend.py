@@ -73,7 +73,7 @@ def build_task(control_frequency: int, extend: SceneExtension | None = None) -> 
     )
 
 
-def make_lift(control_frequency: int, image_size: int | None) -> Any:
+def make_lift(control_frequency: int, image_size: int | None, hard_reset: bool = True) -> Any:
     """Robosuite's own ``Lift`` with the wrist camera's square image, or without; the benchmark's peer."""
     from robosuite.environments.manipulation.lift import Lift
 
@@ -83,7 +83,7 @@ def make_lift(control_frequency: int, image_size: int | None) -> Any:
         robots="Panda",
         control_freq=control_frequency,
         horizon=10**9,
-        hard_reset=False,
+        hard_reset=hard_reset,
         has_offscreen_renderer=seeing,
         use_camera_obs=seeing,
         camera_names="robot0_eye_in_hand",

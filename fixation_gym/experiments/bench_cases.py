@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -94,27 +95,26 @@ def record_approach(size: Size) -> list[dict[str, Any]]:
 def peer_cases() -> Iterator[Case]:
     """Comparable environments: robosuite always, the others where the extra ``bench`` is installed."""
     yield from _lift_cases()
+    # Importing them registers their environments.
     if importlib.util.find_spec("gymnasium_robotics"):
-        import gymnasium_robotics
-
-        gym.register_envs(gymnasium_robotics)
+        importlib.import_module("gymnasium_robotics")
         yield from _gymnasium_cases("fetch", "FetchPickAndPlace-v4", {"width": 128, "height": 128})
     if importlib.util.find_spec("panda_gym"):
-        import panda_gym  # noqa: F401 - registers its environments
-
+        importlib.import_module("panda_gym")
         yield from _gymnasium_cases("panda-gym", "PandaPickAndPlace-v3", {"render_width": 128, "render_height": 128})
 
 
 def _lift_cases() -> Iterator[Case]:
-    from fixation_gym.envs import robosuite_backend
+    from fixation_gym.envs.robosuite_backend import make_lift
 
-    for size in (None, 128):
-        env = robosuite_backend.make_lift(CONTROL_FREQUENCY, size)
-        env.reset()
-        action = np.zeros(env.action_dim)
-        suffix = "" if size is None else f" {label((size, size))}"
-        yield Case(f"lift step{suffix}", lambda env=env, action=action: env.step(action), env.close)
-        yield Case(f"lift reset{suffix}", env.reset)
+    for size, suffix in ((None, ""), (128, " 128x128")):
+        hard, soft = (make_lift(CONTROL_FREQUENCY, size, hard_reset) for hard_reset in (True, False))
+        for env in (hard, soft):
+            env.reset()
+        action = np.zeros(soft.action_dim)
+        yield Case(f"lift step{suffix}", lambda env=soft, action=action: env.step(action), soft.close)
+        yield Case(f"lift soft reset{suffix}", soft.reset)
+        yield Case(f"lift reset{suffix}", hard.reset, hard.close)
 
 
 def _gymnasium_cases(name: str, env_id: str, size: dict[str, Any]) -> Iterator[Case]:
