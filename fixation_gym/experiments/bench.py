@@ -21,7 +21,7 @@ from fixation_gym.doctor import installed_versions
 from fixation_gym.evaluation.storage import SUMMARY_FILE, folder_lock, make_folder, write_json
 from fixation_gym.experiments.bench_cases import Case, all_cases
 from fixation_gym.experiments.bench_figure import draw_figure
-from fixation_gym.experiments.bench_processes import memory_slope_kib, steps_per_second
+from fixation_gym.experiments.bench_processes import lift_reset_rows, memory_slope_kib, steps_per_second
 
 FIGURE_FILE = "bench.png"
 _ROUND_S = 0.12
@@ -76,6 +76,7 @@ def bench(quick: bool, out: Path) -> dict[str, Any]:
             rows = measure(cases, rounds=5 if quick else 25)
             for case in cases:
                 case.close()
+            rows += lift_reset_rows()
             summary: dict[str, Any] = {"rows": rows, "ratios": ratios_of(rows)}
             if not quick:
                 one, two = steps_per_second(1), steps_per_second(2)

@@ -1,4 +1,4 @@
-"""What worker processes add, and whether memory grows: measured in child processes of their own."""
+"""What worker processes add, whether memory grows, and robosuite's default reset: each in processes of its own."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 _STEPS = 400
 _ONE_THREAD = {name: "1" for name in ("LP_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 """Software GL and linear algebra take every core unless told otherwise."""
+_LIFT_RESETS = 8
 _MEMORY_STEPS, _MEMORY_RESETS = 50_000, 500
 
 
@@ -51,6 +52,36 @@ def run_worker() -> None:
     for _ in range(_STEPS):
         env.step(action)
     print(time.perf_counter() - begin, flush=True)
+
+
+def lift_reset_rows() -> list[dict[str, Any]]:
+    """Rows of robosuite's default reset, which compiles the model anew, without and with a 128x128 image."""
+    code = f"from {__name__} import run_lift_resets; run_lift_resets()"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return json.loads(result.stdout.splitlines()[-1])
+
+
+def run_lift_resets() -> None:
+    """Body of that process: print the rows as JSON."""
+    from fixation_gym.gl import select_backend
+
+    select_backend()
+    from fixation_gym.envs.config import CONTROL_FREQUENCY
+    from fixation_gym.envs.robosuite_backend import make_lift
+
+    rows = []
+    for size, suffix in ((None, ""), (128, " 128x128")):
+        env = make_lift(CONTROL_FREQUENCY, size, hard_reset=True)
+        env.reset()
+        times = []
+        for _ in range(_LIFT_RESETS):
+            begin = time.perf_counter()
+            env.reset()
+            times.append(1e3 * (time.perf_counter() - begin))
+        median, p95 = float(np.median(times)), float(np.percentile(times, 95))
+        rows.append({"name": f"lift reset{suffix}", "ms_median": median, "ms_p95": p95, "calls": len(times)})
+        env.close()
+    print(json.dumps(rows))
 
 
 def memory_slope_kib() -> dict[str, Any]:
