@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -107,6 +108,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._reward_terms = rewards.dense_terms if reward == "dense" else rewards.sparse_terms
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
         self.observation_space = observation_space(self._image_size)
+        self._limits = {key: (box.low, box.high) for key, box in self.observation_space.items()}
         self._sim: PickSim | None = None
         self._views: dict[str, View] = {}
         self._window: Window | None = None
@@ -212,7 +214,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     # -- pieces --------------------------------------------------------------------------------------------------
 
     def _observe(self, exposed_qpos: FloatArray) -> dict[str, Any]:
-        state = self.sim.arm_state()
+        self._arm = state = self.sim.arm_state()
         observation: dict[str, Any] = {}
         if self._image_size is not None:
             image = self._image("observation", exposed_qpos)
@@ -222,7 +224,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         pose = sensors.measure_camera_pose(
             state.camera_pose, state.jacobian, joint_pos - state.joint_pos, self._errors.hand_eye
         )
-        vectors = {
+        vectors: dict[str, Any] = {
             "joint_pos": joint_pos,
             "joint_vel": joint_vel,
             "gripper_width": [state.gripper_width],
@@ -231,8 +233,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             "time": [self._steps / self.control_frequency],
         }
         for key, value in vectors.items():
-            space = self.observation_space[key]  # pyright: ignore[reportIndexIssue]
-            observation[key] = np.clip(np.asarray(value), space.low, space.high).astype(np.float32)
+            low, high = self._limits[key]
+            observation[key] = np.minimum(np.maximum(value, low), high).astype(np.float32)
         if self.render_view == "overlay" and self.render_mode == "rgb_array":
             self._percept = self._perception.update(Observation.from_dict(observation))
         return observation
@@ -244,7 +246,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
 
             size = _FRONT_SIZE if view == "front" else (self.intrinsics.height, self.intrinsics.width)
             camera = "front" if view == "front" else "wrist"
-            self._views[view] = View(self.sim.model, camera, *size, full_quality=view != "observation")
+            for_people = view != "observation"
+            model = self.sim.display_model if for_people else self.sim.model
+            self._views[view] = View(model, camera, *size, full_quality=for_people)
         mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
         return self._views[view].render(qpos, with_reflections=mirror)
 
@@ -253,8 +257,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         if self._window is None:
             from fixation_gym.envs.rendering import Window
 
-            self._window = Window(self.sim.model, self.sim.data)
-        self._window.sync()
+            self._window = Window(self.sim.display_model)
+        self._window.show(self.sim.data.qpos)
 
     def _task_state(self) -> rewards.TaskState:
         sim = self.sim
@@ -263,15 +267,16 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         return rewards.TaskState(distance, sim.target_rise(), held, self._collided)
 
     def _info(self, terms: dict[str, float]) -> dict[str, Any]:
-        pose = self.sim.arm_state().camera_pose
-        target = pose[:3, :3].T @ (self.sim.body_position("target") - pose[:3, 3])
-        centre = np.array([self.intrinsics.cx, self.intrinsics.cy])
+        pose = self._arm.camera_pose
+        x, y, z = (pose[:3, :3].T @ (self.sim.body_position("target") - pose[:3, 3])).tolist()
+        camera = self.intrinsics
+        offset = math.hypot(camera.fx * x / z, camera.fy * y / z) if z > 0.0 else math.nan
         return {
             "is_success": self._state.success,
             "success": self._state.success,
             "collision": self._state.collision,
             "clearance_m": self.sim.clearance(),
-            "distance_true_m": float(target[2]),
-            "fixation_error_px": float(np.linalg.norm(self.intrinsics.project(target) - centre)),
+            "distance_true_m": z,
+            "fixation_error_px": offset,
             "reward_terms": terms,
         }

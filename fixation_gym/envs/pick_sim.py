@@ -16,10 +16,11 @@ import numpy as np
 
 from fixation_gym.control.computed_torque import ArmDynamics, ArmTask, arm_torques, camera_kinematics
 from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
-from fixation_gym.envs import contacts, scene_mjcf
-from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, ROBOT_BODIES, SceneExtension, build_task
+from fixation_gym.envs import contacts
+from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, SceneExtension
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.scene_loader import SceneLoader
+from fixation_gym.envs.task_model import compile_model
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.robot import HAND_EYE, TOOL_IN_HAND
 from fixation_gym.types import FloatArray
@@ -59,17 +60,11 @@ class PickSim:
             posture: joint angles, shape (7,), rad, with the role of ``POSTURE``.
         """
         self._posture = posture
-        task = build_task(control_frequency, extend)
-        self.model: Any = task.sim.model._model
-        self.data: Any = task.sim.data._data
-        self._robosuite_task = task  # owns model and data
+        self._control_frequency, self._extend = control_frequency, extend
+        self._compiled = compile_model(control_frequency, extend)
+        self.model: Any = self._compiled.model
+        self.data: Any = self._compiled.data
         model = self.model
-        mirror = model.mat("mirror_glass").id
-        model.mat_reflectance[np.arange(model.nmat) != mirror] = 0.0
-        # Pool shapes are resized at reset, the mid-phase's bounding trees are not.
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-        # Parked and resting objects sleep until something touches them.
-        model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
         self.substeps = round(1.0 / (control_frequency * model.opt.timestep))
         self._hand = model.body(HAND_BODY).id
         base = model.body(BASE_BODY).id
@@ -87,23 +82,10 @@ class PickSim:
             model.opt.timestep,
         )
         self._arm_dynamics = self._view_arm()
-        self._geom_owner = contacts.geom_owners(model, ROBOT_BODIES)
-        self._group_geoms()
-        self._loader = SceneLoader(model)  # every load restores the groups as they are now
+        self._loader = SceneLoader(model)
+        self._display: tuple[Any, SceneLoader] | None = None
         self._joint_command = np.zeros(7)
         self.obstacles: tuple[str, ...] = ()
-
-    def _group_geoms(self) -> None:
-        """Tell the robot's looks (182,000 faces) from their low-poly stand-ins, the collision shapes."""
-        model = self.model
-        for geom in np.flatnonzero(self._geom_owner == contacts.ROBOT):
-            if model.geom_group[geom] == scene_mjcf.VISIBLE_GROUP:
-                model.geom_group[geom] = scene_mjcf.ROBOT_GROUP
-            else:
-                model.geom_group[geom] = scene_mjcf.STAND_IN_GROUP
-                model.geom_rgba[geom] = (0.85, 0.86, 0.88, 1.0)
-        for leg in range(1, 5):  # under the table, from where neither wrist camera nor mirror can see them
-            model.geom(f"table_leg{leg}_visual").group = scene_mjcf.ROBOT_GROUP
 
     def _view_arm(self) -> ArmDynamics:
         """Views into the simulator's arrays; the arm's joints are the first of the model and form one chain."""
@@ -131,7 +113,10 @@ class PickSim:
         """
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
+        self._scene = scene
         placed = self._loader.load(scene)
+        if self._display is not None:
+            self._display[1].load(scene)
         mujoco.mj_setConst(model, data)
         mujoco.mj_resetData(model, data)
         for body, (position, yaw) in placed.items():
@@ -191,12 +176,21 @@ class PickSim:
             fingers[:] = finger, -finger
             mujoco.mj_step2(model, data)
             if self.obstacles and not collided:
-                collided = contacts.robot_hits_obstacle(model, data, self._geom_owner)
+                collided = contacts.robot_hits_obstacle(model, data, self._compiled.owners)
             if substep == exposure_substep:
                 exposed = data.qpos.copy()
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         return exposed, collided
+
+    @property
+    def display_model(self) -> Any:
+        """The model with the robot's looks, for pictures for people, with the same scene; compiled at first use."""
+        if self._display is None:
+            model = compile_model(self._control_frequency, self._extend, looks=True).model
+            self._display = model, SceneLoader(model)
+            self._display[1].load(self._scene)
+        return self._display[0]
 
     # -- truth ---------------------------------------------------------------------------------------------------
 
@@ -228,4 +222,4 @@ class PickSim:
 
     def clearance(self) -> float:
         """Smallest distance between robot and obstacles, m, at most ``contacts.LARGEST_CLEARANCE``."""
-        return contacts.clearance(self.model, self.data, self._geom_owner)
+        return contacts.clearance(self.model, self.data, self._compiled.owners)

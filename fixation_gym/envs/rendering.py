@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import atexit
+import math
 import os
 import sys
 from typing import Any
@@ -15,6 +16,10 @@ import numpy as np
 
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.types import FloatArray, ImageArray
+
+
+_SKY_FROM = math.sin(math.radians(15.0))
+"""Sine of the elevation below which the room's walls hide the sky from everywhere within the arm's reach."""
 
 
 class View:
@@ -43,6 +48,8 @@ class View:
         model.vis.global_.offheight, model.vis.global_.offwidth = fine
         model.vis.quality.offsamples = 4 if full_quality else 0
         model.vis.quality.shadowsize = 1024
+        if not full_quality:  # boxes are lit at corners of so many quads along a side: more show in highlights only
+            model.vis.quality.numquads = min(model.vis.quality.numquads, 2)
         self._renderer = mujoco.Renderer(model, *fine)
         self._pixels = np.empty((*fine, 3), np.uint8)
         self._model = model
@@ -54,6 +61,8 @@ class View:
         self._option.geomgroup[:] = 0
         self._option.geomgroup[scene_mjcf.VISIBLE_GROUP] = 1
         self._full_quality = full_quality
+        self._camera_id = model.camera(camera).id
+        self._border = _border_rays(math.radians(model.cam_fovy[self._camera_id]), width / height)
         # Freed before EGL shuts down, which MuJoCo registered when it made the context; later, EGL complains.
         atexit.register(self.close)
 
@@ -69,11 +78,18 @@ class View:
         flags = self._renderer.scene.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW] = int(self._full_quality)
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = int(with_reflections)
+        # The sky costs a millisecond even where it is hidden. A mirror may show it from anywhere.
+        flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = int(self._full_quality or with_reflections or self._looks_up())
         self._renderer.render(out=self._pixels)
         height, width = self._size
         if self._full_quality:
             return self._pixels.copy()
         return np.asarray(cv2.resize(self._pixels, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+    def _looks_up(self) -> bool:
+        """Whether part of the image may show what is above the walls."""
+        upwards = self._data.cam_xmat[self._camera_id].reshape(3, 3)[2]
+        return bool(np.max(self._border @ upwards) > _SKY_FROM)
 
     def close(self) -> None:
         """Free the GL context; may be called twice."""
@@ -81,11 +97,18 @@ class View:
         self._renderer.close()
 
 
+def _border_rays(fovy: float, aspect: float) -> FloatArray:
+    """Unit vectors to corners and middles of the sides of the image, shape (8, 3), in MuJoCo's camera frame."""
+    half = math.tan(0.5 * fovy)
+    rays = [(x * aspect * half, y * half, -1.0) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
+    return np.array(rays) / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
 class Window:
     """MuJoCo's interactive viewer on a running simulation."""
 
-    def __init__(self, model: Any, data: Any) -> None:
-        """Open the window.
+    def __init__(self, model: Any) -> None:
+        """Open the window on a model, an ``mjModel``.
 
         Raises:
             RuntimeError: without a display.
@@ -94,12 +117,15 @@ class Window:
             raise RuntimeError('render_mode="human" needs a display; without one use render_mode="rgb_array"')
         import mujoco.viewer
 
-        self._viewer = mujoco.viewer.launch_passive(model, data)
+        self._model, self._data = model, mujoco.MjData(model)
+        self._viewer = mujoco.viewer.launch_passive(model, self._data)
         self._viewer.opt.geomgroup[:] = 0
         self._viewer.opt.geomgroup[[scene_mjcf.VISIBLE_GROUP, scene_mjcf.ROBOT_GROUP]] = 1
 
-    def sync(self) -> None:
-        """Show the present state."""
+    def show(self, qpos: FloatArray) -> None:
+        """Show a configuration."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
         self._viewer.sync()
 
     def close(self) -> None:

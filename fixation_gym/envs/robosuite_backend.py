@@ -30,11 +30,18 @@ SceneExtension = Callable[[ET.Element, ET.Element], None]
 """Adds an experiment's own things to the MJCF elements ``asset`` and ``worldbody``."""
 
 
+class _Scene(ManipulationTask):
+    """Arena and robot as one model."""
+
+    def generate_id_mappings(self, sim: Any) -> None:
+        """Nothing here uses robosuite's segmentation, which asks for geoms that ``remove_looks`` takes out."""
+
+
 class _FixationPickTask(ManipulationEnv):
     """robosuite task: Panda at a table with the object pool. Only builds the model; ``PickSim`` steps it."""
 
-    def __init__(self, extend: SceneExtension | None, **options: Any) -> None:
-        self._extend = extend  # the base class loads the model
+    def __init__(self, extend: SceneExtension | None, looks: bool, **options: Any) -> None:
+        self._extend, self._looks = extend, looks  # the base class loads the model
         super().__init__(**options)
 
     def _load_model(self) -> None:
@@ -43,7 +50,7 @@ class _FixationPickTask(ManipulationEnv):
         robot.set_base_xpos(robot.base_xpos_offset["table"](_TABLE_SIZE[0]))
         arena = TableArena(table_full_size=_TABLE_SIZE, table_offset=_TABLE_OFFSET)
         arena.set_origin([0, 0, 0])
-        self.model = ManipulationTask(mujoco_arena=arena, mujoco_robots=[robot])
+        self.model = _Scene(mujoco_arena=arena, mujoco_robots=[robot])
         scene_mjcf.add_materials(self.model.asset, lambda file: xml_path_completion(f"textures/{file}"))
         worldbody = self.model.worldbody
         hand = next(body for body in worldbody.iter("body") if body.get("name") == HAND_BODY)
@@ -52,7 +59,9 @@ class _FixationPickTask(ManipulationEnv):
         scene_mjcf.add_background(worldbody, _TABLE_OFFSET)
         if self._extend is not None:
             self._extend(self.model.asset, worldbody)
-        scene_mjcf.draw_last(worldbody, ("floor", "wall", "board"))
+        scene_mjcf.draw_last(worldbody)
+        if not self._looks:
+            scene_mjcf.remove_looks(self.model.asset, worldbody, ROBOT_BODIES)
         ET.SubElement(self.model.contact, "exclude", {"body1": BASE_BODY, "body2": "robot0_link1"})
 
     def reward(self, action: Any = None) -> float:
@@ -60,10 +69,17 @@ class _FixationPickTask(ManipulationEnv):
         return 0.0
 
 
-def build_task(control_frequency: int, extend: SceneExtension | None = None) -> Any:
-    """Build the task once; its ``sim`` holds model and data. It is reset and stepped by ``PickSim``."""
+def build_task(control_frequency: int, extend: SceneExtension | None, looks: bool) -> Any:
+    """Build the task; its ``sim`` holds model and data.
+
+    Args:
+        control_frequency: steps per second.
+        extend: adds an experiment's own things to the model.
+        looks: with the meshes that only people look at; joints and contacts are the same without.
+    """
     return _FixationPickTask(
         extend,
+        looks,
         robots="Panda",
         has_offscreen_renderer=False,
         use_camera_obs=False,

@@ -24,6 +24,7 @@ _RIM_RGBA = (0.16, 0.17, 0.20, 1.0)
 _WRITTEN_FIELDS = (
     *("geom_size", "geom_pos", "geom_rbound", "geom_aabb", "geom_group", "geom_contype", "geom_conaffinity"),
     *("geom_matid", "geom_rgba", "body_mass", "body_inertia", "body_ipos", "body_iquat", "body_gravcomp", "light_dir"),
+    *("body_contype", "body_conaffinity"),
 )
 """Fields of the model that a scene changes."""
 
@@ -60,6 +61,8 @@ class SceneLoader:
         self._table_geom = model.geom("table_visual").id
         pool = [entry.geom for parts in self._parts.values() for entry in parts]
         model.geom_contype[pool] = model.geom_conaffinity[pool] = 0
+        bodies = list(self._bodies.values())
+        model.body_contype[bodies] = model.body_conaffinity[bodies] = 0  # what its geoms have, together
         self._untouched = {name: getattr(model, name).copy() for name in _WRITTEN_FIELDS}
 
     def load(self, scene: SceneSpec) -> dict[str, tuple[Vector, float]]:
@@ -112,6 +115,7 @@ class SceneLoader:
         model.body_iquat[body_id] = [1.0, 0.0, 0.0, 0.0]
         model.body_inertia[body_id] = mass * (moments.sum() - moments)
         model.body_gravcomp[body_id] = 0.0
+        model.body_contype[body_id] = model.body_conaffinity[body_id] = 1
 
     def _dress(self, slot: str, obstacle: ObstacleSpec) -> None:
         model = self._model

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from fixation_gym.types import FloatArray
 
@@ -34,8 +33,30 @@ def pose_to_matrix(pose: FloatArray) -> FloatArray:
 
 def matrix_to_pose(matrix: FloatArray) -> FloatArray:
     """Homogeneous matrix (4, 4) to a pose (7,), position and quaternion (w, x, y, z) with w >= 0."""
-    x, y, z, w = Rotation.from_matrix(matrix[:3, :3]).as_quat(canonical=True)
-    return np.array([*matrix[:3, 3], w, x, y, z])
+    w, x, y, z = _quaternion(matrix[:3, :3])
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    px, py, pz = matrix[:3, 3].tolist()
+    return np.array([px, py, pz, w / norm, x / norm, y / norm, z / norm])
+
+
+def _quaternion(rotation: FloatArray) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) of any length, w >= 0, of a rotation matrix of shape (3, 3).
+
+    The largest of the four entries is taken from the diagonal and divides the others (Shepperd 1978), so that no angle
+    loses digits.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    trace = xx + yy + zz
+    largest = max(trace, xx, yy, zz)
+    if largest == trace:
+        w, x, y, z = 1.0 + trace, zy - yz, xz - zx, yx - xy
+    elif largest == xx:
+        w, x, y, z = zy - yz, 1.0 + xx - yy - zz, xy + yx, xz + zx
+    elif largest == yy:
+        w, x, y, z = xz - zx, xy + yx, 1.0 - xx + yy - zz, yz + zy
+    else:
+        w, x, y, z = yx - xy, xz + zx, yz + zy, 1.0 - xx - yy + zz
+    return (-w, -x, -y, -z) if w < 0.0 else (w, x, y, z)
 
 
 def inverse(matrix: FloatArray) -> FloatArray:
@@ -49,24 +70,8 @@ def inverse(matrix: FloatArray) -> FloatArray:
 
 
 def rotation_vector(rotation: FloatArray) -> tuple[float, float, float]:
-    """Axis times angle, rad in 0..pi, of a rotation matrix of shape (3, 3), by way of its quaternion.
-
-    The largest of the four quaternion entries is taken from the diagonal and divides the others (Shepperd 1978), so
-    that no angle loses digits.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
-    trace = xx + yy + zz
-    largest = max(trace, xx, yy, zz)
-    if largest == trace:
-        w, x, y, z = 1.0 + trace, zy - yz, xz - zx, yx - xy
-    elif largest == xx:
-        w, x, y, z = zy - yz, 1.0 + xx - yy - zz, xy + yx, xz + zx
-    elif largest == yy:
-        w, x, y, z = xz - zx, xy + yx, 1.0 - xx + yy - zz, yz + zy
-    else:
-        w, x, y, z = yx - xy, xz + zx, yz + zy, 1.0 - xx - yy + zz
-    if w < 0.0:
-        w, x, y, z = -w, -x, -y, -z
+    """Axis times angle, rad in 0..pi, of a rotation matrix of shape (3, 3)."""
+    w, x, y, z = _quaternion(rotation)
     sine = math.sqrt(x * x + y * y + z * z)
     # Both have the same unknown factor, so w > 0 stands for the cosine; for tiny angles angle / sine -> 2 / w.
     scale = 2.0 * math.atan2(sine, w) / sine if sine > 1e-12 * w else 2.0 / w

@@ -1,0 +1,57 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's functions have no type stubs.)
+"""The compiled model of the pick task, once for physics and the wrist camera, once for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fixation_gym.envs import contacts, scene_mjcf
+from fixation_gym.envs.robosuite_backend import ROBOT_BODIES, SceneExtension, build_task
+
+
+@dataclass(frozen=True, eq=False)
+class TaskModel:
+    """Model, its data, and whose geoms are whose."""
+
+    model: Any
+    """``mjModel``."""
+    data: Any
+    """``mjData``."""
+    owners: contacts.Owners
+    """Owner of every geom, as in ``contacts``."""
+    task: Any
+    """robosuite's task, which owns model and data."""
+
+
+def compile_model(control_frequency: int, extend: SceneExtension | None = None, *, looks: bool = False) -> TaskModel:
+    """Build and compile the model.
+
+    Args:
+        control_frequency: control steps per second.
+        extend: adds an experiment's own things to the model.
+        looks: with the robot's looks, for pictures for people. Without them the robot is seen by its coarse stand-ins,
+            the collision shapes, and only in a mirror; ``qpos`` means the same in both.
+    """
+    task = build_task(control_frequency, extend, looks)
+    model, data = task.sim.model._model, task.sim.data._data
+    mirror = model.mat("mirror_glass").id
+    model.mat_reflectance[np.arange(model.nmat) != mirror] = 0.0
+    # Pool shapes are resized at reset, the mid-phase's bounding trees are not. Nobody reads robosuite's sensors.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE | mujoco.mjtDisableBit.mjDSBL_SENSOR
+    # Parked and resting objects sleep until something touches them.
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    owners = contacts.geom_owners(model, ROBOT_BODIES)
+    for geom in np.flatnonzero(owners == contacts.ROBOT):
+        if model.geom_group[geom] == scene_mjcf.VISIBLE_GROUP:
+            model.geom_group[geom] = scene_mjcf.ROBOT_GROUP
+        else:
+            model.geom_group[geom] = scene_mjcf.STAND_IN_GROUP
+            model.geom_rgba[geom] = (0.85, 0.86, 0.88, 1.0)
+    for leg in range(1, 5):  # under the table, from where neither wrist camera nor mirror can see them
+        model.geom(f"table_leg{leg}_visual").group = scene_mjcf.ROBOT_GROUP
+    return TaskModel(model, data, owners, task)
