@@ -108,7 +108,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._reward_terms = rewards.dense_terms if reward == "dense" else rewards.sparse_terms
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
         self.observation_space = observation_space(self._image_size)
-        self._limits = {key: (box.low, box.high) for key, box in self.observation_space.items()}
+        boxes = ((key, box) for key, box in self.observation_space.items() if isinstance(box, spaces.Box))
+        self._limits = {key: (box.low, box.high) for key, box in boxes}
         self._sim: PickSim | None = None
         self._views: dict[str, View] = {}
         self._window: Window | None = None

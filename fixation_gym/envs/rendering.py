@@ -17,7 +17,6 @@ import numpy as np
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.types import FloatArray, ImageArray
 
-
 _SKY_FROM = math.sin(math.radians(15.0))
 """Sine of the elevation below which the room's walls hide the sky from everywhere within the arm's reach."""
 
@@ -51,6 +50,8 @@ class View:
         if not full_quality:  # boxes are lit at corners of so many quads along a side: more show in highlights only
             model.vis.quality.numquads = min(model.vis.quality.numquads, 2)
         self._renderer = mujoco.Renderer(model, *fine)
+        if factor > 1:
+            _take_nearest_texels(self._renderer, model)
         self._pixels = np.empty((*fine, 3), np.uint8)
         self._model = model
         # Images are taken of a copy, so that an exposure before the end of the period leaves the physics untouched.
@@ -95,6 +96,22 @@ class View:
         """Free the GL context; may be called twice."""
         atexit.unregister(self.close)
         self._renderer.close()
+
+
+def _take_nearest_texels(renderer: mujoco.Renderer, model: Any) -> None:
+    """Sample far textures at the nearest texel of the nearest resolution instead of blending eight of them.
+
+    Several samples per pixel blend already; in software GL this saves a fifth of the time of a picture.
+    """
+    from OpenGL import GL  # chooses its platform when imported, so not before the backend is selected
+
+    assert renderer._gl_context is not None
+    assert renderer._mjr_context is not None
+    renderer._gl_context.make_current()
+    for texture, kind in zip(renderer._mjr_context.texture, model.tex_type, strict=False):
+        target = GL.GL_TEXTURE_2D if kind == mujoco.mjtTexture.mjTEXTURE_2D else GL.GL_TEXTURE_CUBE_MAP
+        GL.glBindTexture(target, int(texture))
+        GL.glTexParameteri(target, GL.GL_TEXTURE_MIN_FILTER, GL.GL_NEAREST_MIPMAP_NEAREST)
 
 
 def _border_rays(fovy: float, aspect: float) -> FloatArray:
