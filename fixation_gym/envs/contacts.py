@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fixation_gym.envs.config import COLLISION_FORCE
+from fixation_gym.types import FloatArray
 
 OTHER, ROBOT, OBSTACLE = 0, 1, 2
 """Owners of geoms."""
@@ -57,21 +58,39 @@ def _any_touch(geoms: Owners, owners: Owners) -> bool:
     return False
 
 
-def clearance(model: Any, data: Any, owners: Owners) -> float:
-    """Smallest distance between robot and obstacles, m, at most ``LARGEST_CLEARANCE``; 0 or below in contact."""
+def colliding_geoms(model: Any, owners: Owners) -> tuple[Owners, Owners]:
+    """Geoms of the robot and of the obstacles that have contacts in the present scene."""
     collides = model.geom_contype + model.geom_conaffinity > 0
     robot, obstacle = (np.flatnonzero((owners == owner) & collides) for owner in (ROBOT, OBSTACLE))
-    if not len(obstacle):
-        return LARGEST_CLEARANCE
-    gaps = np.linalg.norm(data.geom_xpos[robot][:, None] - data.geom_xpos[obstacle][None], axis=-1)
-    gaps -= model.geom_rbound[robot][:, None] + model.geom_rbound[obstacle][None]
+    return robot, obstacle
+
+
+def clearance(model: Any, data: Any, robot: Owners, obstacle: Owners) -> float:
+    """Smallest distance between geoms of the robot and of the obstacles, m; 0 or below in contact.
+
+    It is at most ``LARGEST_CLEARANCE``.
+    """
     nearest = LARGEST_CLEARANCE
-    for flat in np.argsort(gaps, axis=None):
-        i, j = np.unravel_index(flat, gaps.shape)
+    if not len(obstacle):
+        return nearest
+    gaps = _gaps(data.geom_xpos, model.geom_rbound, robot, obstacle)
+    for flat in np.argsort(gaps, axis=None).tolist():
+        i, j = divmod(flat, len(obstacle))
         if gaps[i, j] >= nearest:  # bounding spheres: all that follow are farther
             break
         nearest = min(nearest, _geom_distance(model, data, int(robot[i]), int(obstacle[j]), nearest))
     return nearest
+
+
+@njit(cache=True)
+def _gaps(positions: FloatArray, radii: FloatArray, first: Owners, second: Owners) -> FloatArray:
+    """Distances between bounding spheres of geoms, shape (len(first), len(second)), m."""
+    gaps = np.empty((len(first), len(second)))
+    for i, a in enumerate(first):
+        for j, b in enumerate(second):
+            x, y, z = positions[a] - positions[b]
+            gaps[i, j] = np.sqrt(x * x + y * y + z * z) - radii[a] - radii[b]
+    return gaps
 
 
 def _geom_distance(model: Any, data: Any, first: int, second: int, largest: float) -> float:

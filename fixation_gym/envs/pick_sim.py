@@ -124,6 +124,7 @@ class PickSim:
             data.qpos[address : address + 3] = self._base_position + position
             data.qpos[address + 3 : address + 7] = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
         self.obstacles = tuple(body for body in placed if body != "target")
+        self._colliding = contacts.colliding_geoms(model, self._compiled.owners)
         start = look_at(np.array(scene.camera_position), np.array(scene.gaze_point), np.array([0.0, 0.0, 1.0]))
         data.qpos[self._fingers] = data.ctrl[7:9] = [0.04, -0.04]
         data.qpos[self._arm] = self._joint_command[:] = self._inverse_kinematics(start)
@@ -222,4 +223,4 @@ class PickSim:
 
     def clearance(self) -> float:
         """Smallest distance between robot and obstacles, m, at most ``contacts.LARGEST_CLEARANCE``."""
-        return contacts.clearance(self.model, self.data, self._compiled.owners)
+        return contacts.clearance(self.model, self.data, *self._colliding)

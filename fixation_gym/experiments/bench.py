@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from tqdm import tqdm
 
 from fixation_gym.doctor import installed_versions
 from fixation_gym.evaluation.storage import SUMMARY_FILE, folder_lock, make_folder, write_json
-from fixation_gym.experiments.bench_cases import Case, all_cases
+from fixation_gym.experiments.bench_cases import all_groups
 from fixation_gym.experiments.bench_figure import draw_figure
+from fixation_gym.experiments.bench_groups import Group, ProcessGroup
 from fixation_gym.experiments.bench_processes import lift_reset_rows, memory_slope_kib, steps_per_second
 
 FIGURE_FILE = "bench.png"
@@ -68,62 +68,51 @@ def bench(quick: bool, out: Path) -> dict[str, Any]:
     """
     make_folder(out)
     started = time.monotonic()
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        with folder_lock(out):
-            cases = all_cases()
-            rows = measure(cases, rounds=5 if quick else 25)
-            for case in cases:
-                case.close()
-            rows += lift_reset_rows()
-            summary: dict[str, Any] = {"rows": rows, "ratios": ratios_of(rows)}
-            if not quick:
-                one, two = steps_per_second(1), steps_per_second(2)
-                summary["workers"] = {"steps_per_s": [one, two], "ratio": two / one, "goal": WORKERS_GOAL}
-                summary["memory"] = memory_slope_kib()
-            summary |= {
-                "perception_goals_ms": PERCEPTION_GOALS_MS,
-                "versions": installed_versions(),
-                "gl": os.environ.get("MUJOCO_GL"),
-                "cpus": os.cpu_count(),
-                "wall_s": time.monotonic() - started,
-            }
-            draw_figure(out / FIGURE_FILE, rows)
-            write_json(out / SUMMARY_FILE, summary)
-    finally:
-        cv2.setNumThreads(threads)
+    with folder_lock(out):
+        groups = [ProcessGroup(build) for build in all_groups()]
+        try:
+            rows = measure(groups, rounds=5 if quick else 25)
+        finally:
+            for group in groups:
+                group.close()
+        rows += lift_reset_rows()
+        summary: dict[str, Any] = {"rows": rows, "ratios": ratios_of(rows)}
+        if not quick:
+            one, two = steps_per_second(1), steps_per_second(2)
+            summary["workers"] = {"steps_per_s": [one, two], "ratio": two / one, "goal": WORKERS_GOAL}
+            summary["memory"] = memory_slope_kib()
+        summary |= {
+            "perception_goals_ms": PERCEPTION_GOALS_MS,
+            "versions": installed_versions(),
+            "gl": os.environ.get("MUJOCO_GL"),
+            "cpus": os.cpu_count(),
+            "wall_s": time.monotonic() - started,
+        }
+        draw_figure(out / FIGURE_FILE, rows)
+        write_json(out / SUMMARY_FILE, summary)
     return summary
 
 
-def measure(cases: Sequence[Case], rounds: int) -> list[dict[str, Any]]:
-    """Time all cases in turn, ``rounds`` times; returns a row per case with median and 95th percentile, ms."""
-    calls = [_calls_per_round(case) for case in cases]
+def measure(groups: Sequence[Group], rounds: int) -> list[dict[str, Any]]:
+    """Time all cases of all groups in turn, ``rounds`` times.
+
+    Returns:
+        A row per case with median and 95th percentile, ms.
+    """
+    cases = [(group, index, name) for group in groups for index, name in enumerate(group.names)]
     times: list[list[float]] = [[] for _ in cases]
     for _ in tqdm(range(rounds), unit="round", dynamic_ncols=True):
-        for case, count, own in zip(cases, calls, times, strict=True):
-            for _ in range(count):
-                begin = time.perf_counter()
-                case.run()
-                own.append(time.perf_counter() - begin)
+        for (group, index, _), own in zip(cases, times, strict=True):
+            own += group.time(index, _ROUND_S)
     return [
         {
-            "name": case.name,
+            "name": name,
             "ms_median": 1e3 * float(np.median(own)),
             "ms_p95": 1e3 * float(np.percentile(own, 95)),
             "calls": len(own),
         }
-        for case, own in zip(cases, times, strict=True)
+        for (_, _, name), own in zip(cases, times, strict=True)
     ]
-
-
-def _calls_per_round(case: Case) -> int:
-    """Warm up, then as many calls as fit into a round, 1 to 50."""
-    for _ in range(3):
-        case.run()
-    begin = time.perf_counter()
-    case.run()
-    return int(np.clip(_ROUND_S / (time.perf_counter() - begin), 1, 50))
 
 
 def ratios_of(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:

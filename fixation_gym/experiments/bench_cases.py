@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import importlib.util
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -15,6 +14,7 @@ import numpy as np
 import fixation_gym  # noqa: F401 - registers the environments
 from fixation_gym.envs.config import CONTROL_FREQUENCY
 from fixation_gym.envs.scene import TABLE_HEIGHT
+from fixation_gym.experiments.bench_groups import Case
 from fixation_gym.experiments.bench_stages import stages
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
@@ -30,18 +30,14 @@ _FRAMES = 30
 _ENDLESS = 10**9
 
 
-@dataclass(frozen=True)
-class Case:
-    """One thing to time: ``run`` does it once."""
-
-    name: str
-    run: Callable[[], Any]
-    close: Callable[[], Any] = lambda: None
-
-
-def all_cases() -> list[Case]:
-    """Every case that can run here, built and ready."""
-    return [*environment_cases(), *perception_cases(), *peer_cases()]
+def all_groups() -> list[Callable[[], Iterator[Case]]]:
+    """What makes the cases of each process; peers only where they are installed."""
+    groups = [environment_cases, perception_cases, lift_cases, lift_image_cases]
+    if importlib.util.find_spec("gymnasium_robotics"):
+        groups += [fetch_cases, fetch_image_cases]
+    if importlib.util.find_spec("panda_gym"):
+        groups += [panda_gym_cases, panda_gym_image_cases]
+    return groups
 
 
 def label(size: Size) -> str:
@@ -92,53 +88,85 @@ def record_approach(size: Size) -> list[dict[str, Any]]:
     return recorded
 
 
-def peer_cases() -> Iterator[Case]:
-    """Comparable environments: robosuite always, the others where the extra ``bench`` is installed."""
-    yield from _lift_cases()
-    # Importing them registers their environments.
-    if importlib.util.find_spec("gymnasium_robotics"):
-        importlib.import_module("gymnasium_robotics")
-        yield from _gymnasium_cases("fetch", "FetchPickAndPlace-v4", {"width": 128, "height": 128})
-    if importlib.util.find_spec("panda_gym"):
-        importlib.import_module("panda_gym")
-        yield from _gymnasium_cases("panda-gym", "PandaPickAndPlace-v3", {"render_width": 128, "render_height": 128})
+def lift_cases() -> Iterator[Case]:
+    """Robosuite's ``Lift`` without image."""
+    return _lift_cases(None, "")
 
 
-def _lift_cases() -> Iterator[Case]:
-    """With soft resets: the default ones tear down GL contexts, the other cases' included."""
+def lift_image_cases() -> Iterator[Case]:
+    """The same with its wrist image."""
+    return _lift_cases(128, " 128x128")
+
+
+def _lift_cases(size: int | None, suffix: str) -> Iterator[Case]:
+    """With soft resets; the default ones are timed apart, as they take seconds."""
     from fixation_gym.envs.robosuite_backend import make_lift
+    from fixation_gym.gl import select_backend
 
-    for size, suffix in ((None, ""), (128, " 128x128")):
-        env = make_lift(CONTROL_FREQUENCY, size, hard_reset=False)
-        env.reset()
-        action = np.zeros(env.action_dim)
-        yield Case(f"lift step{suffix}", lambda env=env, action=action: env.step(action), env.close)
-        yield Case(f"lift soft reset{suffix}", env.reset)
+    select_backend()
+    env = make_lift(CONTROL_FREQUENCY, size, hard_reset=False)
+    env.reset()
+    action = np.zeros(env.action_dim)
+    yield Case(f"lift step{suffix}", lambda: env.step(action)[0].get("robot0_eye_in_hand_image"), env.close)
+    yield Case(f"lift soft reset{suffix}", env.reset)
 
 
-def _gymnasium_cases(name: str, env_id: str, size: dict[str, Any]) -> Iterator[Case]:
-    """Step and reset without image, and a step followed by an image."""
+def fetch_cases() -> Iterator[Case]:
+    """Gymnasium-Robotics' ``FetchPickAndPlace`` without image; importing the package registers it."""
+    importlib.import_module("gymnasium_robotics")
+    return _gymnasium_cases("fetch", "FetchPickAndPlace-v4")
+
+
+def fetch_image_cases() -> Iterator[Case]:
+    """The same with an image."""
+    importlib.import_module("gymnasium_robotics")
+    return _gymnasium_image_cases("fetch", "FetchPickAndPlace-v4", {"width": 128, "height": 128})
+
+
+def panda_gym_cases() -> Iterator[Case]:
+    """panda-gym's ``PandaPickAndPlace`` without image."""
+    importlib.import_module("panda_gym")
+    return _gymnasium_cases("panda-gym", "PandaPickAndPlace-v3")
+
+
+def panda_gym_image_cases() -> Iterator[Case]:
+    """The same with an image."""
+    importlib.import_module("panda_gym")
+    return _gymnasium_image_cases("panda-gym", "PandaPickAndPlace-v3", {"render_width": 128, "render_height": 128})
+
+
+def _gymnasium_cases(name: str, env_id: str) -> Iterator[Case]:
+    """Step and reset."""
     env = gym.make(env_id, max_episode_steps=_ENDLESS)
     env.reset(seed=0)
     yield Case(f"{name} step", _stepper(env), env.close)
-    yield Case(f"{name} reset", env.reset)
-    seeing = gym.make(env_id, max_episode_steps=_ENDLESS, render_mode="rgb_array", **size)
-    seeing.reset(seed=0)
-    step = _stepper(seeing)
-    yield Case(f"{name} step 128x128", lambda: (step(), seeing.render()), seeing.close)
+    yield Case(f"{name} reset", lambda: env.reset() and None)
+
+
+def _gymnasium_image_cases(name: str, env_id: str, size: dict[str, Any]) -> Iterator[Case]:
+    """A step followed by an image."""
+    env = gym.make(env_id, max_episode_steps=_ENDLESS, render_mode="rgb_array", **size)
+    env.reset(seed=0)
+    step = _stepper(env)
+
+    def run() -> Any:
+        step()
+        return env.render()
+
+    yield Case(f"{name} step 128x128", run, env.close)
 
 
 def _stepper(env: gym.Env[Any, Any]) -> Callable[[], Any]:
-    """Step with a slow cyclic action."""
+    """Step with a slow cyclic action; returns the wrist image if the observation has one."""
     shape = env.action_space.shape or (1,)
     count = 0
 
-    def run() -> None:
+    def run() -> Any:
         nonlocal count
         action = np.zeros(shape, np.float32)
         action[0], action[1] = 0.3 * np.cos(0.1 * count), 0.3 * np.sin(0.1 * count)
-        env.step(action)
         count += 1
+        return env.step(action)[0].get("rgb")
 
     return run
 

@@ -3,21 +3,28 @@
 from itertools import count
 
 import cv2
+import numpy as np
 import pytest
 
-from fixation_gym.experiments import bench
-from fixation_gym.experiments.bench_cases import Case
+from fixation_gym.experiments import bench, bench_groups
 from fixation_gym.experiments.bench_figure import draw_figure
+from fixation_gym.experiments.bench_groups import Case, LocalGroup
 
 
-def test_cases_are_interleaved_and_every_call_is_timed(monkeypatch):
+def test_cases_of_all_groups_are_interleaved_and_every_call_is_timed(monkeypatch):
     order, clock = [], count()
-    monkeypatch.setattr(bench.time, "perf_counter", lambda: float(next(clock)))  # every call takes one second
-    cases = [Case(name, lambda name=name: order.append(name)) for name in ("a", "b")]
-    rows = bench.measure(cases, rounds=3)
-    assert order[-6:] == ["a", "b"] * 3
-    assert [row["name"] for row in rows] == ["a", "b"]
+    monkeypatch.setattr(bench_groups.time, "perf_counter", lambda: float(next(clock)))  # every call takes one second
+    groups = [LocalGroup([Case(name, lambda name=name: order.append(name)) for name in names]) for names in ("ab", "c")]
+    rows = bench.measure(groups, rounds=3)
+    assert order[-9:] == ["a", "b", "c"] * 3
+    assert [row["name"] for row in rows] == ["a", "b", "c"]
     assert all(row["calls"] == 3 and row["ms_median"] == 1000.0 for row in rows)
+
+
+def test_a_case_that_draws_nothing_is_refused():
+    group = LocalGroup([Case("blank", lambda: np.full((4, 4, 3), 7, np.uint8))])
+    with pytest.raises(RuntimeError, match="'blank' shows nothing"):
+        group.time(0, 0.0)
 
 
 def test_ratios_need_both_sides_and_know_their_direction():
