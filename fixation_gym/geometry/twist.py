@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import expm
 
 from fixation_gym.geometry.rigid import inverse, rotation_vector
 from fixation_gym.types import FloatArray
@@ -31,10 +30,19 @@ def exp_twist(twist: FloatArray, duration: float) -> FloatArray:
 
     T_a_cam @ T is the new pose.
     """
-    generator = np.zeros((4, 4))
-    generator[:3, :3] = skew(twist[3:])
-    generator[:3, 3] = twist[:3]
-    return expm(generator * duration)
+    turn = skew(np.asarray(twist[3:]) * duration)
+    angle = math.sqrt(float(0.5 * (turn * turn).sum()))
+    # I + a W + b W^2 is the rotation and I + b W + c W^2 times v the translation (Rodrigues); 1 - a loses digits for
+    # small angles, but its product with W^2 does not, so the series is only needed where angle^2 vanishes beside 1.
+    a, b, c = 1.0, 1.0 / 2.0, 1.0 / 6.0
+    if angle > 1e-6:
+        a, b = math.sin(angle) / angle, 2.0 * (math.sin(0.5 * angle) / angle) ** 2
+        c = (1.0 - a) / angle**2
+    square = turn @ turn
+    motion = np.eye(4)
+    motion[:3, :3] += a * turn + b * square
+    motion[:3, 3] = (np.eye(3) + b * turn + c * square) @ (np.asarray(twist[:3]) * duration)
+    return motion
 
 
 def mean_twist(T_a_start: FloatArray, T_a_end: FloatArray, duration: float) -> FloatArray:

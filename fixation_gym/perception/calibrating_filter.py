@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fixation_gym.geometry.rigid import cross
 from fixation_gym.types import FloatArray
 
 
@@ -179,11 +180,13 @@ def _model(mean: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
     shift = t + tau * v
     ray = scaled + rho * shift + (turn @ scaled[..., None])[..., 0]
     by_target = np.concatenate([rotation[:, :, :2], baseline[..., None]], axis=2)
-    by_target = by_target + turn @ by_target
-    by_target[:, :, 2] += shift
-    by_motion = np.concatenate([np.broadcast_to(rho * np.eye(3), turn.shape), -_skews(scaled)], axis=2)
-    by_age = rho * v + np.cross(w, scaled)
-    by_state = np.concatenate([by_target, by_motion, by_age[..., None]], axis=2)
+    by_state = np.zeros((len(rows), 3, 10))
+    by_state[:, :, :3] = by_target + turn @ by_target
+    by_state[:, :, 2] += shift
+    by_state[:, (0, 1, 2), (3, 4, 5)] = rho
+    by_state[:, :, 6:9] = -_skews(scaled)
+    by_state[:, :, 9] = rho * v + _crosses(w, scaled)
+    by_motion = by_state[:, :, 3:9]
     project = np.zeros((len(rows), 2, 3))
     project[:, 0, 0] = project[:, 1, 1] = 1.0
     project[:, :, 2] = -centroid
@@ -194,8 +197,16 @@ def _model(mean: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
 def _skews(vectors: FloatArray) -> FloatArray:
     """Matrices S with S p = cross(vector, p), shape (n, 3, 3), of vectors of shape (n, 3)."""
     x, y, z = vectors.T
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    result = np.zeros((len(vectors), 3, 3))
+    result[:, 2, 1], result[:, 0, 2], result[:, 1, 0] = x, y, z
+    result[:, 1, 2], result[:, 2, 0], result[:, 0, 1] = -x, -y, -z
+    return result
+
+
+def _crosses(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products of vectors of shape (n, 3); ``np.cross`` takes several times as long for a window's few rows."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def _noise(rows: FloatArray, by_pose: FloatArray, settings: CalibratingSettings) -> FloatArray:
@@ -279,7 +290,7 @@ def distance_at(state: CalibratingState, sighting: Sighting) -> Distance:
     pose_variance = float(momentary @ pose_cov @ momentary)
     lens = robot.copy()
     lens[3:9] = momentary
-    lens_depth = float(q[2] + mean[5] + np.cross(mean[6:9], q)[2])
+    lens_depth = float(q[2] + mean[5] + cross(mean[6:9], q)[2])
     stds = [float(np.sqrt(by @ state.cov @ by + pose_variance)) for by in (robot, lens)]
     return Distance(max(float(q[2]), MIN_DEPTH_M), stds[0], max(lens_depth, MIN_DEPTH_M), stds[1])
 
