@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fixation_gym.geometry.rigid import cross
+from fixation_gym.geometry.twist import crosses, skews
 from fixation_gym.types import FloatArray
 
 
@@ -176,7 +177,7 @@ def _model(mean: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
     v, w, centroid = rows[:, 48:51], rows[:, 51:54], rows[:, 54:56]
     rho, t, tau = mean[2], mean[3:6], mean[9]
     scaled = rotation @ np.array([mean[0], mean[1], 1.0]) + rho * baseline  # q times rho: finite at infinity
-    turn = _skews(mean[6:9] + tau * w)
+    turn = skews(mean[6:9] + tau * w)
     shift = t + tau * v
     ray = scaled + rho * shift + (turn @ scaled[..., None])[..., 0]
     by_target = np.concatenate([rotation[:, :, :2], baseline[..., None]], axis=2)
@@ -184,29 +185,14 @@ def _model(mean: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
     by_state[:, :, :3] = by_target + turn @ by_target
     by_state[:, :, 2] += shift
     by_state[:, (0, 1, 2), (3, 4, 5)] = rho
-    by_state[:, :, 6:9] = -_skews(scaled)
-    by_state[:, :, 9] = rho * v + _crosses(w, scaled)
+    by_state[:, :, 6:9] = -skews(scaled)
+    by_state[:, :, 9] = rho * v + crosses(w, scaled)
     by_motion = by_state[:, :, 3:9]
     project = np.zeros((len(rows), 2, 3))
     project[:, 0, 0] = project[:, 1, 1] = 1.0
     project[:, :, 2] = -centroid
     project /= np.maximum(ray[:, 2], 0.1)[:, None, None]
     return -(project @ ray[..., None])[..., 0], project @ by_state, project @ by_motion
-
-
-def _skews(vectors: FloatArray) -> FloatArray:
-    """Matrices S with S p = cross(vector, p), shape (n, 3, 3), of vectors of shape (n, 3)."""
-    x, y, z = vectors.T
-    result = np.zeros((len(vectors), 3, 3))
-    result[:, 2, 1], result[:, 0, 2], result[:, 1, 0] = x, y, z
-    result[:, 1, 2], result[:, 2, 0], result[:, 0, 1] = -x, -y, -z
-    return result
-
-
-def _crosses(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of vectors of shape (n, 3); ``np.cross`` takes several times as long for a window's few rows."""
-    (ax, ay, az), (bx, by, bz) = a.T, b.T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def _noise(rows: FloatArray, by_pose: FloatArray, settings: CalibratingSettings) -> FloatArray:
@@ -221,7 +207,7 @@ def _adjusted(rows: FloatArray, by_pose: FloatArray, weight: FloatArray, innovat
     pose_cov = rows[:, 12:48].reshape(-1, 6, 6)
     error = (pose_cov @ np.swapaxes(by_pose, 1, 2) @ weight @ innovation[..., None])[..., 0]
     rotation, baseline = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:12, None]
-    turn = _skews(error[:, 3:])
+    turn = skews(error[:, 3:])
     adjusted = rows.copy()
     adjusted[:, :9] += (turn @ rotation).reshape(-1, 9)
     adjusted[:, 9:12] += error[:, :3] + (turn @ baseline)[..., 0]

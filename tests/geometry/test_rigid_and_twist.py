@@ -12,7 +12,7 @@ from fixation_gym.geometry.rigid import (
     rotation_vector,
     transform,
 )
-from fixation_gym.geometry.twist import adjoint, exp_twist, mean_twist, skew
+from fixation_gym.geometry.twist import adjoint, crosses, exp_twist, mean_twist, skew, skews
 
 RNG = np.random.default_rng(1)
 
@@ -61,7 +61,10 @@ def test_the_adjoint_moves_a_twist_to_another_frame():
 
 
 def test_skew_and_cross_are_the_cross_product():
-    for a, b in RNG.normal(size=(20, 2, 3)):
+    many_a, many_b = RNG.normal(size=(2, 20, 3))
+    np.testing.assert_array_equal(crosses(many_a, many_b), np.cross(many_a, many_b))
+    np.testing.assert_array_equal(skews(many_a), [skew(a) for a in many_a])
+    for a, b in zip(many_a, many_b, strict=True):
         np.testing.assert_allclose(skew(a) @ b, np.cross(a, b))
         np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
 
