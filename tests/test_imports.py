@@ -1,8 +1,10 @@
-"""Who may import whom, checked in the source and by importing with modules blocked."""
+"""Who may import whom, checked in the source and in a process where heavy modules are watched and cannot be had."""
 
 import ast
+import json
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -28,8 +30,9 @@ FORBIDDEN["fixation_gym/geometry"] += ("fixation_gym.control", "fixation_gym.env
 FORBIDDEN["fixation_gym/control"] += ("fixation_gym.envs",)
 
 
-def imported_modules(path: Path) -> set[str]:
-    modules = set()
+@cache
+def imported_modules(path: Path) -> frozenset[str]:
+    modules: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
@@ -54,10 +57,53 @@ def test_only_few_files_know_the_simulators():
         assert "mujoco" not in packages or name in MUJOCO_FILES | {"fixation_gym/doctor.py"}, name
 
 
-def test_modules_import_without_simulator_and_torch():
-    modules = ("fixation_gym", "fixation_gym.perception", "policies.servo.servo_policy", "fixation_gym.envs.pick_env")
-    code = "import sys\n"
-    code += "".join(f"sys.modules[{name!r}] = None\n" for name in ("mujoco", "robosuite", "torch"))
-    code += "".join(f"import {name}\n" for name in modules)
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+WATCHED = """
+import contextlib, io, json, sys
+
+class Watch:  # a guarded import is found as well as one that would fail
+    tried = []
+    def find_spec(self, name, path=None, target=None):
+        if name in ("mujoco", "robosuite", "torch", "OpenGL"):
+            self.tried.append(name)
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Watch())
+seen = {}
+
+def stage(name):
+    seen[name], Watch.tried = Watch.tried, []
+
+import fixation_gym.gl
+stage("backend")
+import fixation_gym.cli, fixation_gym.evaluation.demo
+with contextlib.redirect_stdout(io.StringIO()) as shown:
+    try:
+        fixation_gym.cli.main(["evaluate", "--help"])
+    except SystemExit as end:
+        assert not end.code
+stage("help")
+import fixation_gym.perception, policies.servo.servo_policy, fixation_gym.envs.pick_env
+stage("modules")
+print(json.dumps({**seen, "text": shown.getvalue()}))
+"""
+
+
+@pytest.fixture(scope="module")
+def watched():
+    """What one fresh process tried to import at each stage, and the help text; a process takes most of a second."""
+    result = subprocess.run([sys.executable, "-c", WATCHED], capture_output=True, text=True, cwd=ROOT, check=False)
     assert result.returncode == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def test_choosing_a_backend_does_not_import_the_simulator(watched):
+    assert watched["backend"] == []
+
+
+def test_help_loads_neither_simulator_nor_torch(watched):
+    assert watched["help"] == []
+    assert "--scenario" in watched["text"]
+
+
+def test_modules_import_without_simulator_and_torch(watched):
+    assert watched["modules"] == []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import expm
 
 from fixation_gym.geometry.rigid import inverse, rotation_vector
 from fixation_gym.types import FloatArray
@@ -15,6 +14,21 @@ def skew(vector: FloatArray) -> FloatArray:
     """Matrix S, shape (3, 3), with S @ p = cross(vector, p)."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def skews(vectors: FloatArray) -> FloatArray:
+    """``skew`` of every vector, shape (n, 3, 3), of vectors of shape (n, 3)."""
+    x, y, z = vectors.T
+    result = np.zeros((len(vectors), 3, 3))
+    result[:, 2, 1], result[:, 0, 2], result[:, 1, 0] = x, y, z
+    result[:, 1, 2], result[:, 2, 0], result[:, 0, 1] = -x, -y, -z
+    return result
+
+
+def crosses(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products, shape (n, 3), of vectors of shape (n, 3); for few of them ``np.cross`` takes far longer."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def adjoint(T_a_b: FloatArray) -> FloatArray:
@@ -31,10 +45,19 @@ def exp_twist(twist: FloatArray, duration: float) -> FloatArray:
 
     T_a_cam @ T is the new pose.
     """
-    generator = np.zeros((4, 4))
-    generator[:3, :3] = skew(twist[3:])
-    generator[:3, 3] = twist[:3]
-    return expm(generator * duration)
+    turn = skew(np.asarray(twist[3:]) * duration)
+    angle = math.sqrt(float(0.5 * (turn * turn).sum()))
+    # I + a W + b W^2 is the rotation and I + b W + c W^2 times v the translation (Rodrigues); 1 - a loses digits for
+    # small angles, but its product with W^2 does not, so the series is only needed where angle^2 vanishes beside 1.
+    a, b, c = 1.0, 1.0 / 2.0, 1.0 / 6.0
+    if angle > 1e-6:
+        a, b = math.sin(angle) / angle, 2.0 * (math.sin(0.5 * angle) / angle) ** 2
+        c = (1.0 - a) / angle**2
+    square = turn @ turn
+    motion = np.eye(4)
+    motion[:3, :3] += a * turn + b * square
+    motion[:3, 3] = (np.eye(3) + b * turn + c * square) @ (np.asarray(twist[:3]) * duration)
+    return motion
 
 
 def mean_twist(T_a_start: FloatArray, T_a_end: FloatArray, duration: float) -> FloatArray:

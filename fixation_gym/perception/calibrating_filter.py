@@ -18,6 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fixation_gym.geometry.rigid import cross
+from fixation_gym.geometry.twist import crosses, skews
 from fixation_gym.types import FloatArray
 
 
@@ -175,27 +177,22 @@ def _model(mean: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
     v, w, centroid = rows[:, 48:51], rows[:, 51:54], rows[:, 54:56]
     rho, t, tau = mean[2], mean[3:6], mean[9]
     scaled = rotation @ np.array([mean[0], mean[1], 1.0]) + rho * baseline  # q times rho: finite at infinity
-    turn = _skews(mean[6:9] + tau * w)
+    turn = skews(mean[6:9] + tau * w)
     shift = t + tau * v
     ray = scaled + rho * shift + (turn @ scaled[..., None])[..., 0]
     by_target = np.concatenate([rotation[:, :, :2], baseline[..., None]], axis=2)
-    by_target = by_target + turn @ by_target
-    by_target[:, :, 2] += shift
-    by_motion = np.concatenate([np.broadcast_to(rho * np.eye(3), turn.shape), -_skews(scaled)], axis=2)
-    by_age = rho * v + np.cross(w, scaled)
-    by_state = np.concatenate([by_target, by_motion, by_age[..., None]], axis=2)
+    by_state = np.zeros((len(rows), 3, 10))
+    by_state[:, :, :3] = by_target + turn @ by_target
+    by_state[:, :, 2] += shift
+    by_state[:, (0, 1, 2), (3, 4, 5)] = rho
+    by_state[:, :, 6:9] = -skews(scaled)
+    by_state[:, :, 9] = rho * v + crosses(w, scaled)
+    by_motion = by_state[:, :, 3:9]
     project = np.zeros((len(rows), 2, 3))
     project[:, 0, 0] = project[:, 1, 1] = 1.0
     project[:, :, 2] = -centroid
     project /= np.maximum(ray[:, 2], 0.1)[:, None, None]
     return -(project @ ray[..., None])[..., 0], project @ by_state, project @ by_motion
-
-
-def _skews(vectors: FloatArray) -> FloatArray:
-    """Matrices S with S p = cross(vector, p), shape (n, 3, 3), of vectors of shape (n, 3)."""
-    x, y, z = vectors.T
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
 
 
 def _noise(rows: FloatArray, by_pose: FloatArray, settings: CalibratingSettings) -> FloatArray:
@@ -210,7 +207,7 @@ def _adjusted(rows: FloatArray, by_pose: FloatArray, weight: FloatArray, innovat
     pose_cov = rows[:, 12:48].reshape(-1, 6, 6)
     error = (pose_cov @ np.swapaxes(by_pose, 1, 2) @ weight @ innovation[..., None])[..., 0]
     rotation, baseline = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:12, None]
-    turn = _skews(error[:, 3:])
+    turn = skews(error[:, 3:])
     adjusted = rows.copy()
     adjusted[:, :9] += (turn @ rotation).reshape(-1, 9)
     adjusted[:, 9:12] += error[:, :3] + (turn @ baseline)[..., 0]
@@ -279,7 +276,7 @@ def distance_at(state: CalibratingState, sighting: Sighting) -> Distance:
     pose_variance = float(momentary @ pose_cov @ momentary)
     lens = robot.copy()
     lens[3:9] = momentary
-    lens_depth = float(q[2] + mean[5] + np.cross(mean[6:9], q)[2])
+    lens_depth = float(q[2] + mean[5] + cross(mean[6:9], q)[2])
     stds = [float(np.sqrt(by @ state.cov @ by + pose_variance)) for by in (robot, lens)]
     return Distance(max(float(q[2]), MIN_DEPTH_M), stds[0], max(lens_depth, MIN_DEPTH_M), stds[1])
 

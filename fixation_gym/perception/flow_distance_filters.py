@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from fixation_gym.geometry.interaction import rotation_part, translation_part
+from fixation_gym.geometry.rigid import cross
 from fixation_gym.geometry.twist import skew
 from fixation_gym.types import FloatArray, MaskArray
 
@@ -115,7 +116,7 @@ def predict(state: FlowFilterState, dt: float, settings: FlowFilterSettings) -> 
         F[8, 8], F[8, 2] = 1.0 + 2.0 * d * v[2] * dt, d * d * dt
     else:
         w, n = state.mean[3:6], state.mean[12:]
-        mean[12:] += dt * ((n @ v) * n - np.cross(w, n))
+        mean[12:] += dt * ((n @ v) * n - cross(w, n))
         F[12:, :3] = dt * np.outer(n, n)
         F[12:, 3:6] = dt * skew(n)
         F[12:, 12:] += dt * ((n @ v) * np.eye(3) + np.outer(n, v) - skew(w))

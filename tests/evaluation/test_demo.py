@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,8 @@ from fixation_gym.evaluation.storage import EpisodeStore
 CONFIG = EvaluationConfig(scenarios=("clear", "mirror"), episodes=2)
 
 
-@pytest.fixture
-def envs(monkeypatch: pytest.MonkeyPatch) -> list[FakeEnv]:
+def use_fakes(monkeypatch: pytest.MonkeyPatch) -> list[FakeEnv]:
+    """Films environments that are no simulator; returns those that were made."""
     made: list[FakeEnv] = []
 
     def make_env(cell: workers.Cell, render_mode: str, render_view: str) -> FakeEnv:
@@ -32,6 +33,22 @@ def envs(monkeypatch: pytest.MonkeyPatch) -> list[FakeEnv]:
     monkeypatch.setattr(workers, "make_env", make_env)
     monkeypatch.setattr(workers, "make_policy", lambda name, env: FakePolicy())
     return made
+
+
+@pytest.fixture
+def envs(monkeypatch: pytest.MonkeyPatch) -> list[FakeEnv]:
+    return use_fakes(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a demonstration, to copy and not to write to."""
+    out = tmp_path_factory.mktemp("finished")
+    with pytest.MonkeyPatch.context() as patch:
+        envs = use_fakes(patch)
+        demo.run_demo(CONFIG, out)
+    assert all(env.closed for env in envs)
+    return out
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -56,8 +73,8 @@ def test_a_demo_leaves_video_sheet_episodes_and_summary(tmp_path: Path, envs: li
     assert sheet.shape[0] == 4 * (31 + 26) + 5 * 4  # one row per episode; frames carry a caption
 
 
-def test_a_demo_replaces_an_earlier_one(tmp_path: Path, envs: list[FakeEnv]) -> None:
-    demo.run_demo(CONFIG, tmp_path)
+def test_a_demo_replaces_an_earlier_one(tmp_path: Path, envs: list[FakeEnv], finished: Path) -> None:
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
     summary = demo.run_demo(EvaluationConfig(scenarios=("clear",), episodes=1), tmp_path)
     assert summary["scenarios"].keys() == {"clear"}
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
@@ -106,6 +123,7 @@ def raise_broken(*args: Any, **kwargs: Any) -> Any:
 def test_a_demo_that_fails_leaves_the_folder_as_it_was(
     tmp_path: Path,
     envs: list[FakeEnv],
+    finished: Path,
     monkeypatch: pytest.MonkeyPatch,
     break_something: Callable[[pytest.MonkeyPatch], None],
 ) -> None:
@@ -117,7 +135,7 @@ def test_a_demo_that_fails_leaves_the_folder_as_it_was(
 
     try_broken(tmp_path / "new")
     assert list((tmp_path / "new").iterdir()) == []
-    demo.run_demo(CONFIG, tmp_path / "old")
+    shutil.copytree(finished, tmp_path / "old")
     before = contents(tmp_path / "old")
     assert len(before) == 5
     try_broken(tmp_path / "old")

@@ -81,11 +81,11 @@ def test_thirteen_distances_and_both_amplitudes_with_all_prints_that_fit() -> No
     assert min(DISTANCES) == 0.066
     assert max(DISTANCES) == 6.6
     assert np.diff(np.log(DISTANCES)).std() < 0.06
+    groups: dict[tuple[Any, ...], set[float]] = {}
     for cell in cells:
-        wanted = valid_widths(cell["distance_m"], INTRINSICS, cell["amplitude_m"] * (cell["motion"] == "translation"))
-        assert cell["print_width_m"] in wanted
-        group = [other for other in cells if cell_key(other)[:3] == cell_key(cell)[:3]]
-        assert {other["print_width_m"] for other in group} == set(wanted)
+        groups.setdefault(cell_key(cell)[:3], set()).add(cell["print_width_m"])
+    for (distance_m, amplitude_m, motion), widths in groups.items():
+        assert widths == set(valid_widths(distance_m, INTRINSICS, amplitude_m * (motion == "translation")))
     assert {cell["print_width_m"] for cell in cells} == set(WIDTHS)
 
 

@@ -1,9 +1,18 @@
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, pose_to_matrix, rotation_vector, transform
-from fixation_gym.geometry.twist import adjoint, exp_twist, mean_twist, skew
+from fixation_gym.geometry.rigid import (
+    cross,
+    inverse,
+    look_at,
+    matrix_to_pose,
+    pose_to_matrix,
+    rotation_vector,
+    transform,
+)
+from fixation_gym.geometry.twist import adjoint, crosses, exp_twist, mean_twist, skew, skews
 
 RNG = np.random.default_rng(1)
 
@@ -13,6 +22,16 @@ def random_pose():
     matrix[:3, :3] = Rotation.random(rng=RNG).as_matrix()
     matrix[:3, 3] = RNG.normal(size=3)
     return matrix
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-7, 1e-6, 2e-6, 1e-4, 0.01, 0.3, 2.0, 3.1, 7.0])
+@pytest.mark.parametrize("duration", [1.0, -0.04])
+def test_exp_twist_is_the_matrix_exponential(angle, duration):
+    axis, v = np.random.default_rng(2).normal(size=(2, 3))
+    w = angle * axis / np.linalg.norm(axis) / duration
+    generator = np.zeros((4, 4))
+    generator[:3, :3], generator[:3, 3] = skew(w), v
+    np.testing.assert_allclose(exp_twist(np.array([*v, *w]), duration), expm(generator * duration), rtol=0, atol=5e-14)
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-5, 1e-3, 0.1, 2.9])
@@ -41,9 +60,13 @@ def test_the_adjoint_moves_a_twist_to_another_frame():
     np.testing.assert_allclose(moved, exp_twist(adjoint(T_a_b) @ twist, 1.0), atol=1e-9)
 
 
-def test_skew_is_the_cross_product():
-    a, b = RNG.normal(size=(2, 3))
-    np.testing.assert_allclose(skew(a) @ b, np.cross(a, b))
+def test_skew_and_cross_are_the_cross_product():
+    many_a, many_b = RNG.normal(size=(2, 20, 3))
+    np.testing.assert_array_equal(crosses(many_a, many_b), np.cross(many_a, many_b))
+    np.testing.assert_array_equal(skews(many_a), [skew(a) for a in many_a])
+    for a, b in zip(many_a, many_b, strict=True):
+        np.testing.assert_allclose(skew(a) @ b, np.cross(a, b))
+        np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
 
 
 def test_inverse_undoes_a_transform():

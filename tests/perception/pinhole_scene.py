@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 
 import cv2
 import numpy as np
@@ -14,15 +15,18 @@ from fixation_gym.types import Observation
 UP = np.array([0.0, 0.0, 1.0])
 
 
+@cache
 def noise_texture(seed: int, colour=(0.7, 0.7, 0.7), contrast: float = 0.5, size: int = 256) -> np.ndarray:
-    """Broad-band texture, shape (size, size, 3), 0..255 float32."""
+    """Broad-band texture, shape (size, size, 3), 0..255 float32; shared and read-only."""
     rng = np.random.default_rng(seed)
     image = np.zeros((size, size), np.float32)
     for octave in (2, 4, 8, 16):
         coarse = rng.standard_normal((size // octave, size // octave)).astype(np.float32)
         image += cv2.resize(coarse, (size, size), interpolation=cv2.INTER_CUBIC)
     image = np.clip(1 + contrast * image / image.std() / 2, 0.1, 1.4)
-    return np.clip(image[..., None] * np.array(colour, np.float32) * 180, 0, 255)
+    texture = np.clip(image[..., None] * np.array(colour, np.float32) * 180, 0, 255)
+    texture.flags.writeable = False
+    return texture
 
 
 def plain_texture(colour) -> np.ndarray:

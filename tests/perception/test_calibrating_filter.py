@@ -1,6 +1,7 @@
 """The pose filter with calibration states: exact without noise, sure only of what it can know, and hard to upset."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -44,7 +45,9 @@ def sight(t, distance, amplitude, rng, errors=None, age=0.0, fixating=True, targ
     return pose, Sighting(believed, POSE_COV, mean_twist(before, after, 2e-3), centroid)
 
 
+@cache
 def follow(distance, amplitude, seconds=4.0, settings=SETTINGS, seed=0, **options):
+    """State, true pose and sighting after some seconds, errors and settings. Shared, so nobody may write."""
     rng = np.random.default_rng(seed)
     errors = np.repeat([settings.hand_eye_m, settings.hand_eye_rad], 3) * rng.standard_normal(6)
     settings = replace(settings, initial_distance_m=distance * 2.0 ** rng.uniform(-1, 1), centroid_std_size=0.0)
@@ -52,6 +55,8 @@ def follow(distance, amplitude, seconds=4.0, settings=SETTINGS, seed=0, **option
     for t in np.arange(0.0, seconds, 0.1):
         pose, sighting = sight(t, distance, amplitude, rng, errors, settings.image_age_s, **options)
         state = advance(state, sighting, 0.1, settings)
+    for array in (state.mean, state.cov, state.window, pose, sighting.T_base_cam):
+        array.flags.writeable = False
     return state, pose, sighting, errors, settings
 
 

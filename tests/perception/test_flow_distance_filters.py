@@ -1,6 +1,7 @@
 """The flow filters: derivatives against differences, exact data, noise, the fixation constraint, and faults."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -31,15 +32,28 @@ def pose_at(t, distance, fixating):
     return fixating_pose(place, [distance if fixating else 1e6, 0.0, 0.0])
 
 
-def measured(t, distance, fixating, rng, gain=1.0):
-    """True pose, measured twist and flow of a print at (distance, 0, 0) that faces the robot, and its centroid."""
+@cache
+def truth(t, distance, fixating):
+    """Centre of a print at (distance, 0, 0) that faces the robot, true twist, points and flow on it."""
     pose = pose_at(t, distance, fixating)
     twist = mean_twist(pose_at(t - 1e-3, distance, fixating), pose_at(t + 1e-3, distance, fixating), 2e-3)
     normal = pose[:3, :3].T @ [1.0, 0.0, 0.0]
     centre = transform(inverse(pose), np.array([distance, 0.0, 0.0]))
     points = POINTS + centre[:2] / centre[2]
     inverse_depth = np.column_stack([points, np.ones(len(points))]) @ normal / (normal @ centre)
-    flow = gain * np.column_stack(image_flow(points[:, 0], points[:, 1], inverse_depth, twist))
+    flow = np.column_stack(image_flow(points[:, 0], points[:, 1], inverse_depth, twist))
+    return tuple(frozen(array) for array in (centre, twist, points, flow))
+
+
+def frozen(array):
+    array.flags.writeable = False
+    return array
+
+
+def measured(t, distance, fixating, rng, gain=1.0):
+    """Centre of the print, measured twist and flow."""
+    centre, twist, points, flow = truth(t, distance, fixating)
+    flow = gain * flow
     flow_std = 5e-3
     if rng is not None:
         twist = twist + np.sqrt(np.diag(TWIST_COV)) * rng.standard_normal(6)
@@ -48,7 +62,9 @@ def measured(t, distance, fixating, rng, gain=1.0):
     return centre, twist, FlowSamples(points, flow, cov)
 
 
+@cache
 def follow(kind, distance=0.4, fixating=True, steps=125, seed=None, settings=SETTINGS, **options):
+    """State, relative error and relative std after some steps. Shared, so nobody may write."""
     rng = None if seed is None else np.random.default_rng(seed)
     state = initialise(kind, settings)
     for k in range(steps):
@@ -56,6 +72,7 @@ def follow(kind, distance=0.4, fixating=True, steps=125, seed=None, settings=SET
         state = update(state, twist, TWIST_COV, samples, settings)
         estimate, std = distance_of(state, centre[:2] / centre[2])
         state = predict(state, DT, settings)
+    state = replace(state, mean=frozen(state.mean), cov=frozen(state.cov))
     return state, (estimate - centre[2]) / centre[2], std / centre[2]
 
 

@@ -2,6 +2,7 @@ import hashlib
 import subprocess
 import sys
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -20,6 +21,7 @@ FOVY = np.deg2rad(42.5)
 needs_numba = pytest.mark.skipif(not kernels.enabled, reason="numba is not installed")
 
 
+@cache
 def observations(height, width, steps=5):
     """Views of a table with a red patch, a fast near post and a wall, from a circling camera."""
     forward, across = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
@@ -32,10 +34,10 @@ def observations(height, width, steps=5):
         ]
     )
     camera = Intrinsics.from_fovy(height, width, FOVY)
-    for k in range(steps):
-        angle = 0.12 * k
-        pose = fixating_pose([0.1, 0.05 * np.cos(angle), 0.3 + 0.05 * np.sin(angle)], [0.5, 0, 0])
-        yield observe(scene, pose, 0.04 * k, camera)[0]
+    angles = 0.12 * np.arange(steps)
+    places = [[0.1, 0.05 * np.cos(angle), 0.3 + 0.05 * np.sin(angle)] for angle in angles]
+    poses = [fixating_pose(place, [0.5, 0, 0]) for place in places]
+    return [observe(scene, pose, 0.04 * k, camera)[0] for k, pose in enumerate(poses)]
 
 
 def percepts(height, width, **options):
