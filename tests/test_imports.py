@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MUJOCO_FILES = {f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "contacts", "rendering")}
+MUJOCO_FILES = {f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "contacts", "rendering", "truth_view")}
 FORBIDDEN = {
     "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
     "fixation_gym/control": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
@@ -55,7 +55,7 @@ def test_only_few_files_know_the_simulators():
 
 
 def test_modules_import_without_simulator_and_torch():
-    modules = ("fixation_gym", "fixation_gym.perception", "policies.servo.servo_policy", "fixation_gym.envs.pick_env")
+    modules = ("fixation_gym", "fixation_gym.perception", "policies.servo.servo_policy", "fixation_gym.envs.zfc_env")
     code = "import sys\n"
     code += "".join(f"sys.modules[{name!r}] = None\n" for name in ("mujoco", "robosuite", "torch"))
     code += "".join(f"import {name}\n" for name in modules)
