@@ -206,6 +206,11 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         """The simulation's ``mjData``."""
         return self.sim.data
 
+    @property
+    def wrist_view(self) -> View:
+        """The view that makes the observation's image, opened at the first reset."""
+        return self._views["observation"]
+
     def perceive(self) -> Percept:
         """What perception makes of the last observation; it looks once, however often it is asked.
 

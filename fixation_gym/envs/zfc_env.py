@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -27,9 +27,6 @@ from fixation_gym.perception.grasp_axis import narrow_axis
 from fixation_gym.perception.pipeline import Percept
 from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
 from fixation_gym.types import FloatArray, Observation
-
-if TYPE_CHECKING:
-    from fixation_gym.envs.truth_view import TruthView
 
 _GAZE = GazeGains()
 _OPEN_LOOP = OpenLoopGains(hold_seconds=3.0)
@@ -118,7 +115,6 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         self.observation_space = zfc_observation_space(observation, (env.intrinsics.height, env.intrinsics.width))
         self._shown = observation
         self._manoeuvre: Manoeuvre | None = None
-        self._truth_view: TruthView | None = None
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -130,6 +126,10 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Draw a new scene. ``options`` are not used."""
         observation, info = self.env.reset(seed=seed, options=options)
+        if self._shown == "privileged":
+            from fixation_gym.envs.truth_view import TruthView
+
+            self._truth = TruthView(self._base.wrist_view, self._base.model)
         self._manoeuvre = None
         self._moment = self._take_in(observation, info)
         return self._observation(), info
@@ -158,13 +158,6 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
             self._manoeuvre = open_loop.advance(self._manoeuvre, now.T_base_cam, width, time, _OPEN_LOOP)
         return self._observation(), float(reward), terminated, truncated, info
 
-    def close(self) -> None:
-        """Free GL contexts and windows; may be called twice."""
-        if self._truth_view is not None:
-            self._truth_view.close()
-            self._truth_view = None
-        super().close()
-
     def _take_in(self, observation: dict[str, Any], info: dict[str, Any]) -> _Moment:
         reading = Observation.from_dict(observation)
         return _Moment(reading, pose_to_matrix(reading.camera_pose), self._base.perceive(), info["distance_true_m"])
@@ -178,18 +171,10 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         elif self._shown == "rgb":
             observation["rgb"] = now.reading.rgb
         elif self._shown == "privileged":
-            observation["true_map"] = self._true_map(now.distance_true_m)
+            observation["true_map"] = self._truth.nearer(self._base.data, now.distance_true_m)[None]
         observation["fixation"] = fixation_vector(now.percept.fixation)
         observation["proprio"] = proprio_vector(now.reading, now.T_base_cam, stage)
         return observation
-
-    def _true_map(self, distance: float) -> np.ndarray:
-        from fixation_gym.envs.truth_view import TruthView, nearer_map
-
-        if self._truth_view is None:
-            camera = self._base.intrinsics
-            self._truth_view = TruthView(self._base.model, camera.height, camera.width)
-        return nearer_map(self._truth_view.depth(self._base.data), distance)[None]
 
 
 def _gazing_twist(v: FloatArray, now: _Moment) -> FloatArray:
