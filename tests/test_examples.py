@@ -33,6 +33,11 @@ def test_recorded_frames_give_the_distance(tmp_path, capsys):
     assert "+-" in capsys.readouterr().out
 
 
+def test_a_few_lines_on_the_zero_flow_map_pick_the_object_up(capsys):
+    assert load("04_zero_flow_agent").main()
+    assert "% of the map in front" in capsys.readouterr().out
+
+
 def test_examples_are_short_and_each_has_a_test():
     names = sorted(path.stem for path in EXAMPLES.glob("*.py"))
     tests = Path(__file__).read_text()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MUJOCO_FILES = {f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "contacts", "rendering")}
+MUJOCO_FILES = {f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "contacts", "rendering", "truth_view")}
 FORBIDDEN = {
     "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
     "fixation_gym/control": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
@@ -82,7 +82,7 @@ with contextlib.redirect_stdout(io.StringIO()) as shown:
     except SystemExit as end:
         assert not end.code
 stage("help")
-import fixation_gym.perception, policies.servo.servo_policy, fixation_gym.envs.pick_env
+import fixation_gym.perception, policies.servo.servo_policy, fixation_gym.envs.zfc_env
 stage("modules")
 print(json.dumps({**seen, "text": shown.getvalue()}))
 """

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from fixation_gym.types import FloatArray
+
 
 def checked_image_size(image_size: Any) -> tuple[int, int] | None:
     """Return (height, width) as plain integers, or None.
@@ -33,6 +35,18 @@ def require_choice(name: str, value: str | None, allowed: tuple[str | None, ...]
     """
     if value not in allowed:
         raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
+
+
+def checked_action(action: Any, size: int) -> FloatArray:
+    """Return an action of ``size`` numbers clipped to [-1, 1].
+
+    Raises:
+        ValueError: if it has another shape or holds NaN or infinity.
+    """
+    values = np.asarray(action, dtype=np.float64)
+    if values.shape != (size,) or not np.all(np.isfinite(values)):
+        raise ValueError(f"action must be {size} finite numbers in [-1, 1], got shape {values.shape}: {values}")
+    return np.clip(values, -1.0, 1.0)
 
 
 def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from fixation_gym.envs import config, rewards, sensors
-from fixation_gym.envs.arguments import checked_image_size, observation_space, require_choice
+from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
 from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, sample_scene
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
@@ -144,10 +144,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         Raises:
             ValueError: if the action has the wrong shape or holds NaN or infinity.
         """
-        action = np.asarray(action, dtype=np.float64)
-        if action.shape != (7,) or not np.all(np.isfinite(action)):
-            raise ValueError(f"action must be 7 finite numbers in [-1, 1], got shape {action.shape}: {action}")
-        action = np.clip(action, -1.0, 1.0)
+        action = checked_action(action, 7)
         sim = self.sim
         latency = round(self.noise.image_latency_s / sim.model.opt.timestep)
         exposed, hit = sim.step(action[:6] * TWIST_LIMITS, float(action[6]), sim.substeps - latency)
@@ -173,10 +170,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         if self.render_view == "wrist":
             return self._image("wrist", qpos)
         front = self._image("front", qpos)
-        if self.render_view == "front" or self._percept is None:
+        if self.render_view == "front":
             return front
         scale = _FRONT_SIZE[0] / self.intrinsics.height
-        wrist = draw_overlay(self._last_rgb, self._percept, scale=scale)
+        wrist = draw_overlay(self._last_rgb, self.perceive(), scale=scale)
         return np.ascontiguousarray(np.hstack([wrist, front]))
 
     def close(self) -> None:
@@ -212,6 +209,20 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         """The simulation's ``mjData``."""
         return self.sim.data
 
+    @property
+    def wrist_view(self) -> View:
+        """The view that makes the observation's image, opened at the first reset."""
+        return self._views["observation"]
+
+    def perceive(self) -> Percept:
+        """What perception makes of the last observation; it looks once, however often it is asked.
+
+        It needs every frame: call it after ``reset`` and after every step. Rendering the overlay does.
+        """
+        if self._percept is None:
+            self._percept = self._perception.update(Observation.from_dict(self._observation))
+        return self._percept
+
     # -- pieces --------------------------------------------------------------------------------------------------
 
     def _observe(self, exposed_qpos: FloatArray) -> dict[str, Any]:
@@ -236,8 +247,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         for key, value in vectors.items():
             low, high = self._limits[key]
             observation[key] = np.minimum(np.maximum(value, low), high).astype(np.float32)
+        self._observation, self._percept = observation, None
         if self.render_view == "overlay" and self.render_mode == "rgb_array":
-            self._percept = self._perception.update(Observation.from_dict(observation))
+            self.perceive()  # at every step, whether or not it is shown
         return observation
 
     def _image(self, view: str, qpos: FloatArray) -> ImageArray:

@@ -67,6 +67,11 @@ class View:
         # Freed before EGL shuts down, which MuJoCo registered when it made the context; later, EGL complains.
         atexit.register(self.close)
 
+    @property
+    def renderer(self) -> mujoco.Renderer:
+        """Lent to other pictures of the same size: a GL context of their own would copy all meshes and textures."""
+        return self._renderer
+
     def render(self, qpos: FloatArray, *, with_reflections: bool) -> ImageArray:
         """Image of the configuration, shape (H, W, 3), top-left origin."""
         self._data.qpos[:] = qpos

@@ -12,6 +12,8 @@ SUCCESS_BONUS = 10.0
 COLLISION_COST = 5.0
 _DISTANCE_WEIGHT = 2.0
 """Potential per metre between tool and target; 0.5 m at the start is worth 1."""
+_FARTHEST = 1.0
+"""A target that rolled off the table costs no more than this distance, m."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +30,8 @@ class TaskState:
 
 
 def potential(state: TaskState) -> float:
-    """Progress in [-2, 1] or so: 0 with the tool at the target on the table, 1 with the target lifted."""
-    return -_DISTANCE_WEIGHT * state.tool_distance + min(max(state.rise, 0.0) / LIFT_HEIGHT, 1.0)
+    """Progress in [-2, 1]: 0 with the tool at the target on the table, 1 with the target lifted."""
+    return -_DISTANCE_WEIGHT * min(state.tool_distance, _FARTHEST) + min(max(state.rise, 0.0) / LIFT_HEIGHT, 1.0)
 
 
 def dense_terms(before: TaskState, after: TaskState) -> dict[str, float]:

@@ -14,6 +14,7 @@ import numpy as np
 import fixation_gym  # noqa: F401 - registers the environments
 from fixation_gym.envs.config import CONTROL_FREQUENCY
 from fixation_gym.envs.scene import TABLE_HEIGHT
+from fixation_gym.envs.zfc_observation import OBSERVATIONS
 from fixation_gym.experiments.bench_groups import Case
 from fixation_gym.experiments.bench_stages import stages
 from fixation_gym.geometry.camera import Intrinsics
@@ -32,7 +33,7 @@ _ENDLESS = 10**9
 
 def all_groups() -> list[Callable[[], Iterator[Case]]]:
     """What makes the cases of each process; peers only where they are installed."""
-    groups = [environment_cases, perception_cases, lift_cases, lift_image_cases]
+    groups = [environment_cases, learner_cases, perception_cases, lift_cases, lift_image_cases]
     if importlib.util.find_spec("gymnasium_robotics"):
         groups += [fetch_cases, fetch_image_cases]
     if importlib.util.find_spec("panda_gym"):
@@ -55,6 +56,20 @@ def environment_cases() -> Iterator[Case]:
         yield Case(f"step {suffix}", _stepper(env), env.close)
         if size in (None, (128, 128)):
             yield Case(f"reset {suffix}", env.reset)
+
+
+def learner_cases() -> Iterator[Case]:
+    """Step of ``FixationPickZFC-v0`` with every observation, perception and gaze law included."""
+    for observation in OBSERVATIONS:
+        env = gym.make(
+            "FixationPickZFC-v0",
+            scenario="opaque",
+            image_size=(128, 128),
+            observation=observation,
+            max_episode_steps=_ENDLESS,
+        )
+        env.reset(seed=0)
+        yield Case(f"step 128x128 {observation}", _stepper(env), env.close)
 
 
 def perception_cases() -> Iterator[Case]:

@@ -53,6 +53,11 @@ class Segmentation:
     touches_border: bool
     """Whether the mask reaches the image border, so that its centroid is not the one of the whole target."""
 
+    @property
+    def whole(self) -> bool:
+        """Whether all of the target is in the image."""
+        return self.visible and not self.touches_border
+
     def __post_init__(self) -> None:
         for array in (self.mask, self.centroid, self.second_moments):
             array.setflags(write=False)

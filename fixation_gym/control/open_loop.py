@@ -1,0 +1,139 @@
+"""The open-loop manoeuvres: tool to the fixated point, close, lift; and backing off after a failure.
+
+A manoeuvre is a value. ``advance`` gives the next one for what the robot reads, ``manoeuvre_twist`` and
+``gripper_command`` what to do in it. The servo policy and ``FixationPickZFC-v0`` share it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from fixation_gym.control import servo_laws
+from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.types import FloatArray
+
+OPEN, CLOSE = -1.0, 1.0
+"""Gripper commands."""
+
+
+class Stage(str, Enum):
+    """Part of a manoeuvre."""
+
+    GRASP = "grasp"
+    """The tool goes to the target."""
+    CLOSE = "close"
+    LIFT = "lift"
+    RECOVER = "recover"
+    """The hand backs off with open fingers."""
+
+
+@dataclass(frozen=True)
+class OpenLoopGains:
+    """Numbers of the manoeuvres."""
+
+    tool_gain: float = 4.0
+    """Rate at which the tool nears its goal, 1/s."""
+    tool_speed: float = 0.10
+    """Largest speed, m/s."""
+    funnel_slope: float = 2.0
+    """In the grasp, how far the tool stays back per metre that it is off the approach axis."""
+    funnel_length: float = 0.06
+    """Largest distance that it stays back, m."""
+    tool_tolerance: float = 0.004
+    """Distance at which the tool has arrived, m."""
+    finger_room: float = 0.016
+    """Least height of the tool above the support surface, m."""
+    grasp_timeout: float = 4.0
+    """A motion that takes longer has failed, s."""
+    close_seconds: float = 0.8
+    """Time to close the fingers, s."""
+    empty_width: float = 0.012
+    """Fingers closer than this hold nothing, m."""
+    lift_height: float = 0.16
+    """How far to lift, m."""
+    hold_seconds: float = math.inf
+    """After this time in the lift the hand lets go and backs off, s; inf: it holds on."""
+    recover_distance: float = 0.12
+    """How far to back off, m."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Manoeuvre:
+    """What the hand does without looking."""
+
+    stage: Stage
+    started: float
+    """Time at which the stage began, s."""
+    goal: FloatArray
+    """Camera position in base at which the stage's motion ends, shape (3,), m."""
+
+
+def begin_grasp(
+    T_base_cam: FloatArray, point: FloatArray, support_height: float | None, time: float, gains: OpenLoopGains
+) -> Manoeuvre:
+    """Start the grasp of what is fixated.
+
+    Args:
+        T_base_cam: camera pose, shape (4, 4); the hand keeps its orientation.
+        point: fixated point in base, shape (3,), m.
+        support_height: height of the table in base, m; None if unknown.
+        time: s.
+        gains: numbers of the manoeuvre.
+    """
+    point = point.copy()
+    if support_height is not None:
+        point[2] = max(point[2], support_height + gains.finger_room)
+    return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA)
+
+
+def begin_recovery(T_base_cam: FloatArray, time: float, gains: OpenLoopGains) -> Manoeuvre:
+    """Start backing off along the optical axis."""
+    return Manoeuvre(Stage.RECOVER, time, T_base_cam[:3, 3] - T_base_cam[:3, 2] * gains.recover_distance)
+
+
+def advance(
+    manoeuvre: Manoeuvre, T_base_cam: FloatArray, gripper_width: float, time: float, gains: OpenLoopGains
+) -> Manoeuvre | None:
+    """Manoeuvre in which to act now; None when it is over.
+
+    Args:
+        manoeuvre: the one of the last control period.
+        T_base_cam: camera pose, shape (4, 4).
+        gripper_width: opening between the finger pads, m.
+        time: s.
+        gains: numbers of the manoeuvre.
+    """
+    seconds = time - manoeuvre.started
+    arrived = bool(np.linalg.norm(T_base_cam[:3, 3] - manoeuvre.goal) < gains.tool_tolerance)
+    empty = gripper_width < gains.empty_width
+    if manoeuvre.stage is Stage.RECOVER:
+        return None if arrived or seconds > gains.grasp_timeout else manoeuvre
+    if manoeuvre.stage is Stage.GRASP and arrived:
+        return Manoeuvre(Stage.CLOSE, time, T_base_cam[:3, 3].copy())
+    if manoeuvre.stage is Stage.CLOSE and seconds >= gains.close_seconds and not empty:
+        return Manoeuvre(Stage.LIFT, time, T_base_cam[:3, 3] + [0.0, 0.0, gains.lift_height])
+    failed = {
+        Stage.GRASP: seconds > gains.grasp_timeout,
+        Stage.CLOSE: seconds >= gains.close_seconds,
+        Stage.LIFT: empty or seconds > gains.hold_seconds,
+    }[manoeuvre.stage]
+    return begin_recovery(T_base_cam, time, gains) if failed else manoeuvre
+
+
+def manoeuvre_twist(manoeuvre: Manoeuvre, T_base_cam: FloatArray, gains: OpenLoopGains) -> FloatArray:
+    """Camera twist of the manoeuvre, shape (6,); the camera does not turn."""
+    if manoeuvre.stage is Stage.CLOSE:
+        return np.zeros(6)
+    goal = manoeuvre.goal
+    if manoeuvre.stage is Stage.GRASP:  # through a funnel: first in line with the approach axis, then forward
+        goal = servo_laws.funnel_waypoint(T_base_cam, goal, gains.funnel_slope, gains.funnel_length)
+    return servo_laws.pose_twist(T_base_cam, goal, gains.tool_gain, gains.tool_speed)
+
+
+def gripper_command(manoeuvre: Manoeuvre | None) -> float:
+    """``CLOSE`` while the hand closes or holds, ``OPEN`` otherwise."""
+    return CLOSE if manoeuvre is not None and manoeuvre.stage in (Stage.CLOSE, Stage.LIFT) else OPEN

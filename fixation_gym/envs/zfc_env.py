@@ -1,0 +1,189 @@
+"""``FixationPickZFC-v0``: where to move and when to grasp, from the zero-flow map; the gaze is held inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
+
+from fixation_gym.control import gaze, open_loop
+from fixation_gym.control.gaze import GazeGains
+from fixation_gym.control.open_loop import Manoeuvre, OpenLoopGains
+from fixation_gym.envs.arguments import checked_action, require_choice
+from fixation_gym.envs.pick_env import FixationPickEnv
+from fixation_gym.envs.scene import TABLE_HEIGHT
+from fixation_gym.envs.zfc_observation import (
+    OBSERVATIONS,
+    fixation_vector,
+    proprio_vector,
+    zfc_observation_space,
+)
+from fixation_gym.geometry.rigid import pose_to_matrix
+from fixation_gym.perception.grasp_axis import narrow_axis
+from fixation_gym.perception.pipeline import Percept
+from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
+from fixation_gym.types import FloatArray, Observation
+
+_GAZE = GazeGains()
+_OPEN_LOOP = OpenLoopGains(hold_seconds=3.0)
+
+
+def make_zfc_env(observation: str = "zfc", **arguments: Any) -> FixationPickZFC:
+    """Entry point of ``FixationPickZFC-v0``.
+
+    Args:
+        observation: "zfc", "blind", "rgb" or "privileged".
+        arguments: those of ``FixationPickEnv``; ``image_size`` may not be None.
+
+    Raises:
+        ValueError: for a value that is not allowed; the message says what is.
+    """
+    return FixationPickZFC(FixationPickEnv(**arguments), observation)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moment:
+    """The last observation of the inner environment, and what follows from it."""
+
+    reading: Observation
+    T_base_cam: FloatArray
+    percept: Percept
+    distance_true_m: float
+
+
+class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np.ndarray]):
+    """``FixationPick-v0`` for learners: perception, gaze and grasp run inside, the agent chooses the way.
+
+    **Action** ``Box(-1, 1, (4,), float32)``; values outside are clipped.
+
+    | index | meaning | unit at 1 |
+    |---|---|---|
+    | 0-2 | camera velocity v_X (right), v_Y (down), v_Z (forward) in the camera frame | 0.15 m/s |
+    | 3 | above 0 starts the grasp | - |
+
+    The servo laws add the rotation that keeps the fixated object in the image centre, level the hand and turn the
+    gripper across the object's narrow axis when near. If the whole is faster than the camera may move (0.15 m/s,
+    0.8 rad/s per axis), it is slowed down as a whole. v_X and v_Y are dropped where they would lead out of the arm's
+    reach (the servo's limits of azimuth and elevation around the object). Nothing keeps the hand off obstacles or
+    table. While the object is out of sight the gaze stays where it is believed to be; before it was first seen the
+    camera searches for it and the trigger does nothing.
+
+    The grasp is the paper's open-loop manoeuvre: tool to the fixated point, close, lift. Actions are ignored until it
+    ends, and every ``step`` is still one control period. It fails if the tool takes more than 4 s to get there, if the
+    fingers close on nothing, or 3 s after it began to lift without success; then the hand opens, backs off by 12 cm and
+    the agent is in control again.
+
+    **Observation** ``Dict``; the first row depends on ``observation``.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | ``zfc_map`` ("zfc") | (1, 32, 32) uint8 | P(nearer than the fixated object) * 255; 128 = unknown |
+    | nothing ("blind") | | |
+    | ``rgb`` ("rgb") | (H, W, 3) uint8 | wrist image |
+    | ``true_map`` ("privileged") | (1, 32, 32) uint8 | share of the cell truly nearer than the object * 255 |
+    | ``fixation`` | (5,) float32 | centroid x, y (normalised image coordinates), visible, distance m, its std m |
+    | ``proprio`` | (24,) float32 | see below |
+
+    | proprio | meaning | unit |
+    |---|---|---|
+    | 0-6 | joint angles | rad |
+    | 7-9, 10-12 | camera position and optical axis in the robot base frame | m, - |
+    | 13-18 | measured camera twist [v, w] in the camera frame | m/s, rad/s |
+    | 19 | opening between the finger pads | m |
+    | 20-23 | stage of the manoeuvre: grasp, close, lift, recover; one is 1, or all 0 when the next action counts | - |
+
+    Everything but ``true_map`` comes from the sensors. Rewards, end, ``info`` and rendering are those of
+    ``FixationPick-v0``. See ``make_zfc_env`` for arguments.
+    """
+
+    def __init__(self, env: FixationPickEnv, observation: str = "zfc") -> None:
+        """Wrap the environment; ``gymnasium.make`` does it by way of ``make_zfc_env``.
+
+        Raises:
+            ValueError: for an unknown ``observation``, or if the environment renders no wrist image.
+        """
+        require_choice("observation", observation, OBSERVATIONS)
+        super().__init__(env)
+        self._base = env
+        if "rgb" not in env.observation_space.keys():  # noqa: SIM118  # pyright: ignore[reportAttributeAccessIssue]
+            raise ValueError("FixationPickZFC-v0 needs an image_size: its perception works on the wrist image")
+        self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
+        self.observation_space = zfc_observation_space(observation, (env.intrinsics.height, env.intrinsics.width))
+        self._shown = observation
+        self._manoeuvre: Manoeuvre | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """The inner environment's, since its entry point already makes this wrapper."""
+        return self.env.spec
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Draw a new scene. ``options`` are not used."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        if self._shown == "privileged":
+            from fixation_gym.envs.truth_view import TruthView
+
+            self._truth = TruthView(self._base.wrist_view, self._base.model)
+        self._manoeuvre = None
+        self._moment = self._take_in(observation, info)
+        return self._observation(), info
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Run one control period.
+
+        Raises:
+            ValueError: if the action has the wrong shape or holds NaN or infinity.
+        """
+        action = checked_action(action, 4)
+        now = self._moment
+        if self._manoeuvre is None and action[3] > 0.0 and now.percept.fixation.initialised:
+            point, time = now.percept.fixation.point_base, now.reading.time
+            self._manoeuvre = open_loop.begin_grasp(now.T_base_cam, point, TABLE_HEIGHT, time, _OPEN_LOOP)
+        if self._manoeuvre is not None:
+            twist = open_loop.manoeuvre_twist(self._manoeuvre, now.T_base_cam, _OPEN_LOOP)
+        else:
+            twist = _gazing_twist(action[:3] * MAX_LINEAR_SPEED, now)
+        twist = gaze.within_speed(twist)
+        gripper = open_loop.gripper_command(self._manoeuvre)
+        observation, reward, terminated, truncated, info = self.env.step(np.array([*twist / TWIST_LIMITS, gripper]))
+        self._moment = now = self._take_in(observation, info)
+        if self._manoeuvre is not None:
+            width, time = now.reading.gripper_width, now.reading.time
+            self._manoeuvre = open_loop.advance(self._manoeuvre, now.T_base_cam, width, time, _OPEN_LOOP)
+        return self._observation(), float(reward), terminated, truncated, info
+
+    def _take_in(self, observation: dict[str, Any], info: dict[str, Any]) -> _Moment:
+        reading = Observation.from_dict(observation)
+        return _Moment(reading, pose_to_matrix(reading.camera_pose), self._base.perceive(), info["distance_true_m"])
+
+    def _observation(self) -> dict[str, Any]:
+        now = self._moment
+        stage = None if self._manoeuvre is None else self._manoeuvre.stage
+        observation: dict[str, Any] = {}
+        if self._shown == "zfc":
+            observation["zfc_map"] = now.percept.zfc.cells[None].copy()
+        elif self._shown == "rgb":
+            observation["rgb"] = now.reading.rgb
+        elif self._shown == "privileged":
+            observation["true_map"] = self._truth.nearer(self._base.data, now.distance_true_m)[None]
+        observation["fixation"] = fixation_vector(now.percept.fixation)
+        observation["proprio"] = proprio_vector(now.reading, now.T_base_cam, stage)
+        return observation
+
+
+def _gazing_twist(v: FloatArray, now: _Moment) -> FloatArray:
+    """Twist, shape (6,), for the velocity that the agent asks for, shape (3,), m/s."""
+    fixation, T_base_cam = now.percept.fixation, now.T_base_cam
+    v = np.array([*gaze.within_reach(v[:2], T_base_cam, fixation.point_base, _GAZE), v[2]])
+    if not fixation.initialised:
+        return np.array([*v, *gaze.searching_twist(now.reading.time, _GAZE)[3:]])
+    roll_error = gaze.levelling(T_base_cam, _GAZE)
+    if fixation.distance_m < _GAZE.align_distance and now.percept.segmentation.whole:
+        roll_error = narrow_axis(now.percept.segmentation.mask, gaze.roll(T_base_cam), _GAZE.max_roll)
+    return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, _GAZE)

@@ -1,0 +1,69 @@
+"""The observation of ``FixationPickZFC-v0``: what perception makes of a frame, as small arrays. Pure functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fixation_gym.control.open_loop import Stage
+from fixation_gym.perception.distance_filters import Fixation
+from fixation_gym.perception.evidence_map import CELLS
+from fixation_gym.types import FloatArray, Observation
+
+OBSERVATIONS = ("zfc", "blind", "rgb", "privileged")
+"""What the learner gets beside ``fixation`` and ``proprio``."""
+_STAGES = tuple(Stage)
+
+_FIXATION = spaces.Box(
+    np.array([-2.0, -2.0, 0.0, 0.0, 0.0], np.float32), np.array([2.0, 2.0, 1.0, 5.0, 5.0], np.float32)
+)
+_PROPRIO_HIGH = np.repeat(np.array([4.0, 2.0, 1.0, 5.0, 20.0, 0.1, 1.0], np.float32), [7, 3, 3, 3, 3, 1, len(_STAGES)])
+_PROPRIO_LOW = -_PROPRIO_HIGH
+_PROPRIO_LOW[19:] = 0.0
+_PROPRIO = spaces.Box(_PROPRIO_LOW, _PROPRIO_HIGH)
+
+
+def zfc_observation_space(observation: str, image_size: tuple[int, int]) -> spaces.Dict:
+    """Space of the observation; ``observation`` is one of ``OBSERVATIONS``, ``image_size`` (height, width) in px."""
+    cells = spaces.Box(0, 255, (1, CELLS, CELLS), np.uint8)
+    views: dict[str, dict[str, spaces.Space[Any]]] = {
+        "zfc": {"zfc_map": cells},
+        "blind": {},
+        "rgb": {"rgb": spaces.Box(0, 255, (*image_size, 3), np.uint8)},
+        "privileged": {"true_map": cells},
+    }
+    return spaces.Dict({**views[observation], "fixation": _FIXATION, "proprio": _PROPRIO})
+
+
+def fixation_vector(fixation: Fixation) -> NDArray[np.float32]:
+    """Centroid x, y in normalised image coordinates, visible 0 or 1, distance and its std in m; shape (5,)."""
+    values = [*fixation.centroid, float(fixation.visible), fixation.distance_m, fixation.distance_std_m]
+    return _within(_FIXATION, values)
+
+
+def proprio_vector(reading: Observation, T_base_cam: FloatArray, stage: Stage | None) -> NDArray[np.float32]:
+    """What the robot knows of itself, shape (24,), in the order of the environment's table.
+
+    Args:
+        reading: of camera and joints.
+        T_base_cam: its camera pose, shape (4, 4).
+        stage: of the open-loop manoeuvre that will ignore the next action; None if that action counts.
+    """
+    return _within(
+        _PROPRIO,
+        [
+            *reading.joint_pos,
+            *T_base_cam[:3, 3],
+            *T_base_cam[:3, 2],
+            *reading.camera_twist,
+            reading.gripper_width,
+            *(float(stage is known) for known in _STAGES),
+        ],
+    )
+
+
+def _within(box: spaces.Box, values: list[float]) -> NDArray[np.float32]:
+    return np.clip(np.array(values, np.float32), box.low, box.high)
