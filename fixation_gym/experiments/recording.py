@@ -32,7 +32,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.perception import calibrating_filter
 from fixation_gym.perception.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
-from fixation_gym.perception.flat_target import facing_centroid
+from fixation_gym.perception.flat_target import coverage, flat_centroid
 from fixation_gym.perception.flow_distance_filters import FlowSamples
 from fixation_gym.perception.flow_samples import CutOut, FlowName, sample_flow
 from fixation_gym.perception.segmentation import segment
@@ -51,7 +51,7 @@ class Frame:
 
     time: float
     sighting: Sighting
-    """Believed pose, twist, and centroid of the flat target (``facing_centroid``)."""
+    """Believed pose, twist, and centroid of the flat target (``flat_centroid``)."""
     T_base_cam_calibrated: FloatArray
     """Measured pose without the hand-eye error, shape (4, 4)."""
     touches_border: bool
@@ -95,6 +95,7 @@ def filter_settings(noise: SensorNoise, first_guess_m: float, hand_eye: bool = T
     return CalibratingSettings(
         initial_distance_m=first_guess_m,
         centroid_std=CENTROID_STD_PX / INTRINSICS.fx,
+        centroid_std_size=0.0,  # the centroid of a flat print of known normal has no error that grows with its size
         hand_eye_m=noise.hand_eye_m if hand_eye else 0.0,
         hand_eye_rad=noise.hand_eye_rad if hand_eye else 0.0,
         image_age_s=noise.image_latency_s,
@@ -165,7 +166,7 @@ class _Sensors:
         )
         # The print faces the middle of the circle, and the robot knows how it is turned against that view.
         normal = T_base_cam[:3, :3].T @ HOME[:3, 2]
-        centroid = facing_centroid(found.centroid, found.second_moments, normal)
+        centroid = flat_centroid(coverage(seen, found.mask), camera, normal)
         return centroid, math.sqrt(0.5 * float(np.trace(found.second_moments))), found.touches_border, cut_out
 
 

@@ -11,7 +11,7 @@ import pytest
 from fixation_gym.envs.config import SENSOR_NOISE
 from fixation_gym.experiments.sequence import CENTROID_STD_PX, HOME, INTRINSICS, Condition
 from fixation_gym.geometry.rigid import inverse, look_at, transform
-from fixation_gym.perception.flat_target import facing_centroid
+from fixation_gym.perception.flat_target import coverage, flat_centroid
 from fixation_gym.perception.segmentation import segment
 
 pytestmark = pytest.mark.sim
@@ -42,13 +42,14 @@ def test_the_print_is_seen_where_it_is(rig, distance: float, width: float, offse
     pose = rig.arm.camera_pose
     q = transform(inverse(pose), target)
     assert q[2] == pytest.approx(distance, abs=1e-4)
-    found = segment(rig.image(), INTRINSICS)
+    image = rig.image()
+    found = segment(image, INTRINSICS)
     assert not found.touches_border
     columns = np.flatnonzero(found.mask.any(axis=0))
     foreshortened = width * np.sqrt(1.0 - (offset / distance) ** 2)  # and the tip of the beak is too thin to be seen
     assert np.ptp(columns) + 1 == pytest.approx(INTRINSICS.fx * foreshortened / distance, rel=0.06, abs=6)
-    centroid = facing_centroid(found.centroid, found.second_moments, pose[:3, :3].T @ HOME[:3, 2])
-    np.testing.assert_allclose(INTRINSICS.fx * (centroid - q[:2] / q[2]), 0.0, atol=0.3)
+    centroid = flat_centroid(coverage(image, found.mask), INTRINSICS, pose[:3, :3].T @ HOME[:3, 2])
+    np.testing.assert_allclose(INTRINSICS.fx * (centroid - q[:2] / q[2]), 0.0, atol=0.04)
 
 
 def test_the_background_fills_the_image_and_is_not_red(rig) -> None:

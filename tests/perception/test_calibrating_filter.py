@@ -16,7 +16,6 @@ from fixation_gym.perception.calibrating_filter import (
     advance,
     distance_at,
 )
-from fixation_gym.perception.flat_target import facing_centroid
 
 DT = 0.04
 POSE_COV = np.diag([1e-4] * 3 + [2e-4] * 3) ** 2
@@ -185,19 +184,3 @@ def test_a_target_behind_the_camera_has_a_finite_positive_distance():
     now = distance_at(state, beyond)
     assert now.robot > 0.0
     assert np.isfinite([now.robot, now.robot_std, now.lens, now.lens_std]).all()
-
-
-@pytest.mark.parametrize("tilt", [-0.3, 0.1, 0.3])
-def test_the_centre_of_a_slanted_disc_is_found_from_its_pixels(tilt):
-    # A disc of radius r at distance 1, turned about y: integrate over the image by mapping its area there.
-    side = np.linspace(-0.2, 0.2, 401)
-    u, v = (grid.ravel() for grid in np.meshgrid(side, side))
-    inside = u**2 + v**2 < 0.2**2
-    points = np.column_stack([u * np.cos(tilt), v, 1.0 + u * np.sin(tilt)])[inside]
-    image = points[:, :2] / points[:, 2:]
-    normal = np.array([-np.sin(tilt), 0.0, np.cos(tilt)])
-    weight = (points @ normal) / points[:, 2] ** 3
-    centroid = np.average(image, axis=0, weights=weight)
-    moments = np.cov(image.T, aweights=weight, bias=True)
-    assert abs(centroid[0]) > 5e-4
-    np.testing.assert_allclose(facing_centroid(centroid, moments, normal), 0.0, atol=0.02 * abs(centroid[0]))
