@@ -59,7 +59,8 @@ class ScenarioRig:
         self._view = View(self.sim.model, CAMERA_NAME, *IMAGE_SIZE, full_quality=False)
         self.perception = Perception(INTRINSICS, support_height_m=TABLE_HEIGHT)
         self._truth = TruthView(self.sim.model, self.perception.flow_intrinsics)
-        self._owners = [self.sim.model.body(body).name for body in self.sim.model.geom_bodyid]
+        self.owners = tuple(self.sim.model.body(body).name for body in self.sim.model.geom_bodyid)
+        """Name of the body of every geom."""
 
     def draw(self, scene: str, variant: str, rng: np.random.Generator) -> Instance:
         """Draw an instance that the arm can reach and whose target is in view, and reset the simulation to it.
@@ -121,10 +122,6 @@ class ScenarioRig:
     def truth(self, look: Look) -> Truth:
         """Truth of a look on the grid of the flow."""
         return self._truth.look(look.qpos)
-
-    def owner(self, geom: int) -> str:
-        """Name of the body that a geom belongs to; empty for none."""
-        return self._owners[geom] if geom >= 0 else ""
 
     def _observe(
         self, time: float, exposed: FloatArray, errors: sensors.EpisodeErrors, rng: np.random.Generator

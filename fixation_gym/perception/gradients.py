@@ -126,10 +126,27 @@ def _level_sums(
         taps = SPACE_PREFILTER, SPACE_DERIVATIVE
         kernels.pooled_products(smooth, change, *taps, tuple(np.float32(part) for part in noise), pooled)
         kernels.window_sums(pooled, limits, sums)
+        kernels.raise_information(sums, np.float32(least))
         return sums
     _plain_level_sums(smooth, change, noise, settings.window, scratch, sums)
-    np.maximum(sums[:3:2], np.float32(least), out=sums[:3:2])
+    _raise_information(sums, np.float32(least))
     return sums
+
+
+def _raise_information(sums: Float32Array, least: np.float32) -> None:
+    """Add what J, sums[:3], lacks to inform by ``least`` in every direction: its smaller eigenvalue is at least that.
+
+    Along a weak edge the noise taken out may exceed what was there. J would be indefinite, and the motion along the
+    edge would be hundreds of px with a small stated error.
+    """
+    xx, xy, yy = sums[:3]
+    np.maximum(xx, least, out=xx)
+    np.maximum(yy, least, out=yy)
+    spread = np.hypot(xx - yy, np.float32(2.0) * xy)
+    lacking = least - np.float32(0.5) * (xx + yy - spread)
+    np.maximum(lacking, np.float32(0.0), out=lacking)
+    xx += lacking
+    yy += lacking
 
 
 def _plain_level_sums(

@@ -120,6 +120,19 @@ def window_sums(planes, least, sums):
 
 
 @compiled
+def raise_information(sums, least):
+    """Raise the smaller eigenvalue of J = sums[:3] to ``least``; see ``gradients``."""
+    height, width = sums.shape[1:]
+    for row in range(height):
+        xx, xy, yy = sums[0, row], sums[1, row], sums[2, row]
+        for i in range(width):
+            a, c = max(xx[i], least), max(yy[i], least)
+            spread = np.sqrt((a - c) * (a - c) + np.float32(4) * xy[i] * xy[i])
+            lacking = max(least - np.float32(0.5) * (a + c - spread), np.float32(0))
+            xx[i], yy[i] = a + lacking, c + lacking
+
+
+@compiled
 def solve_windows(sums, weak, cov, residual):
     """Invert J = sums[:3] with a weak prior into cov and solve residual = -cov b, b = sums[3:]; see ``gradients``."""
     height, width = sums.shape[1:]

@@ -1,0 +1,65 @@
+"""Front, behind or unknown for a whole thing: a vote over the pixels of its region.
+
+Only edges across the motion carry evidence, so most pixels of a plain thing are unknown, and what is see-through or
+reflects shows mostly things behind. A region is therefore in front as soon as a small but solid share of it is, and
+behind only if hardly anything of it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from fixation_gym.perception.scratch import Float32Array
+from fixation_gym.types import MaskArray
+
+
+class Side(Enum):
+    """Where a thing is, seen from the fixated object."""
+
+    FRONT = "front"
+    BEHIND = "behind"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class VoteSettings:
+    """When a region is decided."""
+
+    min_probability: float = 0.95
+    """Pixels less sure than this abstain."""
+    min_pixels: float = 6.0
+    """Least number of votes for either side, px of the flow grid."""
+    front_share: float = 0.12
+    """Least share of the votes that makes a region count as in front."""
+    behind_share: float = 0.06
+    """Largest share of front votes in a region that counts as behind; in between it is unknown."""
+
+
+def region_votes(
+    p_nearer: Float32Array, moving: MaskArray, region: MaskArray, settings: VoteSettings
+) -> tuple[int, int]:
+    """Number of pixels of a region that are surely in front, or move by themselves, and that are surely behind.
+
+    Args:
+        p_nearer: P(nearer) of every pixel, shape (h, w), 0.5 without evidence.
+        moving: pixels that move by themselves, shape (h, w).
+        region: pixels of the thing, shape (h, w).
+        settings: when a pixel votes.
+    """
+    inside, own = p_nearer[region], moving[region]
+    front = np.count_nonzero((inside > settings.min_probability) | own)
+    behind = np.count_nonzero((inside < 1.0 - settings.min_probability) & ~own)
+    return front, behind
+
+
+def decide(front: float, behind: float, settings: VoteSettings) -> Side:
+    """Side of a region with these votes; votes may be sums over time."""
+    total = front + behind
+    if front >= settings.min_pixels and front >= settings.front_share * total:
+        return Side.FRONT
+    if behind >= settings.min_pixels and front <= settings.behind_share * total:
+        return Side.BEHIND
+    return Side.UNKNOWN
