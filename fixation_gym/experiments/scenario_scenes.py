@@ -281,7 +281,7 @@ def _sample_velocity(view: _View, obstacle: ObstacleSpec, rng: np.random.Generat
     """Horizontal velocity; what stands in front stays there and, if solid, beside the line of sight."""
     speed, direction = rng.uniform(*_SPEED), rng.uniform(0.0, 2.0 * math.pi)
     velocity = speed * np.array([math.cos(direction), math.sin(direction), 0.0])
-    if view.depths(obstacle).max() > 1.0:
+    if not view.is_clearly(obstacle, True):
         return velocity
     end = np.array(obstacle.position) + DURATION_S * velocity
     moved = _changed(obstacle, (float(end[0]), float(end[1]), float(end[2])), obstacle.yaw)

@@ -131,7 +131,7 @@ class Perception:
         fixation = self._follow(observation.time, T_base_cam, segmentation)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
-        grey = prepare_grey(observation.rgb, self._working.height, self._working.width, self._settings.flow)
+        grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         self._frames.append(_Frame(observation.time, grey, T_base_cam, segmentation))
         flow, zero_flow = self._look_for_obstacles()
         middle = self._frames[max(0, len(self._frames) - 2)]
@@ -213,6 +213,6 @@ def _run_once() -> None:
     rgb[40:56, 40:56] = 255, 0, 0
     seen = segment(rgb, camera)
     settings, maps = FlowSettings(), (np.eye(3), np.eye(3))
-    frames = [prepare_grey(np.roll(rgb, shift, axis=1), 96, 96, settings) for shift in range(3)]
+    frames = [prepare_grey(np.roll(rgb, shift, axis=1), 96, 96) for shift in range(3)]
     flow = estimate_flow(frames, (0.0, 1.0, 2.0), camera, maps, 1.0, settings)
     zero_flow_test(flow, Gaze(np.eye(6)[0], 1.0, 0.1, seen.mask, np.eye(4)), ZeroFlowSettings(), None, 0.0)
