@@ -18,6 +18,7 @@ from fixation_gym.experiments.scenario_scores import (
     LEAST_REGION_PX,
     RULES,
     PixelTruth,
+    answered,
     pixel_counts,
     pixel_truth,
     votes,
@@ -70,7 +71,7 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
             totals[rule].update(counts)
         still = answers.side != 0.0
         asked += int(np.count_nonzero(still))
-        unknown += int(np.count_nonzero(still & ~look.percept.zfc.supported))
+        unknown += int(np.count_nonzero(still & ~answered(look)))
         moving += int(np.count_nonzero(still & look.percept.zfc.moving))
     objects = [
         _described(obstacle, record, instance, index)

@@ -90,8 +90,13 @@ def _edges(depth: FloatArray) -> MaskArray:
     return np.asarray(cv2.dilate(small, kernel) > (1.0 + 3.0 * _EDGE) * cv2.erode(small, kernel))
 
 
+def answered(look: Look) -> MaskArray:
+    """Pixels that have evidence of their own, shape (h, w): the same for both rules."""
+    return look.percept.zfc.supported & ~look.percept.zfc.outline
+
+
 def calls(look: Look) -> dict[Rule, MaskArray]:
-    """Pixels that each rule calls nearer, shape (h, w); only supported ones count."""
+    """Pixels that each rule calls nearer, shape (h, w); only those that are ``answered`` count."""
     percept = look.percept
     with np.errstate(invalid="ignore"):
         exact = percept.zfc.inverse_depth > percept.flow.warp_inverse_depth
@@ -100,8 +105,7 @@ def calls(look: Look) -> dict[Rule, MaskArray]:
 
 def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
     """Counts per rule; ratios of their sums are the measures."""
-    supported = look.percept.zfc.supported
-    asked = supported & (truth.side != 0.0)
+    asked = answered(look) & (truth.side != 0.0)
     front = truth.side > 0.0
     result: dict[str, dict[str, int]] = {}
     for rule, called in calls(look).items():
@@ -119,6 +123,8 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
             "front_called": count(asked & front & called),
             "called": count(asked & called),
             "image": count(asked & truth.image),
+            "inner_image": count(asked & truth.image & truth.inner),
+            "inner_image_behind": count(asked & truth.image & truth.inner & ~called),
             "image_behind": count(asked & truth.image & ~called),
             "image_of_obstacle": count(asked & truth.image_of_obstacle),
             "image_of_obstacle_behind": count(asked & truth.image_of_obstacle & ~called),

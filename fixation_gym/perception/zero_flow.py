@@ -21,7 +21,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import epipolar_direction
 from fixation_gym.perception.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
 from fixation_gym.perception.optic_flow import Flow
-from fixation_gym.perception.pixel_test import PixelQuestion, pixel_answers
+from fixation_gym.perception.pixel_test import PixelAnswers, PixelQuestion, pixel_answers
 from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
@@ -52,6 +52,9 @@ class ZeroFlow:
     """Pixels with evidence, shape (h, w)."""
     moving: MaskArray
     """Pixels that move off their epipolar line: something moves by itself there, shape (h, w)."""
+    outline: MaskArray
+    """Pixels that seem nearer, but lie within a window's reach of something surely behind: they may show either, shape
+    (h, w). An outline belongs to the nearer thing and its motion spreads to both sides."""
     cells: ImageArray
     """The map for policies, shape (32, 32): P(nearer) * 255 where known, 128 elsewhere; moving pixels count as near."""
     inverse_depth: Float32Array
@@ -66,6 +69,7 @@ def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
         p_nearer=np.full((height, width), 0.5, np.float32),
         supported=np.zeros((height, width), np.bool_),
         moving=np.zeros((height, width), np.bool_),
+        outline=np.zeros((height, width), np.bool_),
         cells=np.full((CELLS, CELLS), UNKNOWN, np.uint8),
         inverse_depth=np.full((height, width), np.nan, np.float32),
         inverse_depth_std=np.full((height, width), np.inf, np.float32),
@@ -101,10 +105,22 @@ def zero_flow_test(
         p_nearer=answers.p_nearer,
         supported=answers.supported,
         moving=answers.moving,
+        outline=_outline(answers, flow.warp_inverse_depth, settings),
         cells=cells,
         inverse_depth=answers.inverse_depth,
         inverse_depth_std=answers.inverse_depth_std,
     )
+
+
+def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) -> MaskArray:
+    """Pixels that seem nearer than the fixated object, next to some that are surely farther, shape (h, w)."""
+    depth = answers.inverse_depth
+    with np.errstate(invalid="ignore"):
+        farther = depth + np.float32(2.0) * answers.inverse_depth_std < np.float32(fixated)
+        nearer = depth > np.float32(fixated)
+    reach = np.ones((2 * settings.outline_px + 1,) * 2, np.uint8)
+    near_farther = cv2.dilate((farther & answers.supported).view(np.uint8), reach)
+    return nearer & near_farther.view(np.bool_)
 
 
 def _question(flow: Flow, gaze: Gaze, settings: ZeroFlowSettings, support_height_m: float | None) -> PixelQuestion:
