@@ -133,12 +133,12 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
     return result
 
 
-def votes(look: Look, region: MaskArray, settings: VoteSettings) -> dict[Rule, tuple[int, int]]:
+def votes(look: Look, region: MaskArray, settings: VoteSettings) -> dict[Rule, tuple[float, float]]:
     """Votes for front and behind in a region, by each rule; the paper's has neither probability nor own motion."""
     zfc = look.percept.zfc
     supported = zfc.supported & region
     paper = np.count_nonzero(supported & calls(look)["paper"])
     return {
         "paper": (paper, int(np.count_nonzero(supported)) - paper),
-        "exact": region_votes(zfc.p_nearer, zfc.moving, region, settings),
+        "exact": region_votes(zfc, region, settings),
     }

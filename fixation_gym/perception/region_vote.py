@@ -12,7 +12,7 @@ from enum import Enum
 
 import numpy as np
 
-from fixation_gym.perception.scratch import Float32Array
+from fixation_gym.perception.zero_flow import ZeroFlow
 from fixation_gym.types import MaskArray
 
 
@@ -32,27 +32,27 @@ class VoteSettings:
     """Pixels less sure than this abstain."""
     min_pixels: float = 6.0
     """Least number of votes for either side, px of the flow grid."""
+    outline_weight: float = 0.1
+    """A front vote at an outline counts this much: it may be of what covers the thing."""
     front_share: float = 0.12
     """Least share of the votes that makes a region count as in front."""
     behind_share: float = 0.06
     """Largest share of front votes in a region that counts as behind; in between it is unknown."""
 
 
-def region_votes(
-    p_nearer: Float32Array, moving: MaskArray, region: MaskArray, settings: VoteSettings
-) -> tuple[int, int]:
-    """Number of pixels of a region that are surely in front, or move by themselves, and that are surely behind.
+def region_votes(zero_flow: ZeroFlow, region: MaskArray, settings: VoteSettings) -> tuple[float, float]:
+    """Votes of a region for front, or moving by itself, and for behind, px of the flow grid.
 
     Args:
-        p_nearer: P(nearer) of every pixel, shape (h, w), 0.5 without evidence.
-        moving: pixels that move by themselves, shape (h, w).
+        zero_flow: the test.
         region: pixels of the thing, shape (h, w).
         settings: when a pixel votes.
     """
-    inside, own = p_nearer[region], moving[region]
-    front = np.count_nonzero((inside > settings.min_probability) | own)
-    behind = np.count_nonzero((inside < 1.0 - settings.min_probability) & ~own)
-    return front, behind
+    p, own, outline = zero_flow.p_nearer[region], zero_flow.moving[region], zero_flow.outline[region]
+    front = (p > settings.min_probability) | own
+    behind = (p < 1.0 - settings.min_probability) & ~own
+    weak = settings.outline_weight * np.count_nonzero(front & outline)
+    return weak + np.count_nonzero(front & ~outline), float(np.count_nonzero(behind))
 
 
 def decide(front: float, behind: float, settings: VoteSettings) -> Side:

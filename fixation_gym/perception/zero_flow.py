@@ -100,12 +100,16 @@ def zero_flow_test(
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
     answers = pixel_answers(flow, usable, question)
-    cells = evidence_map(answers.p_nearer, answers.supported, answers.moving, settings)
+    outline = _outline(answers, flow.warp_inverse_depth, settings)
+    # A window that holds two motions along one epipolar line solves for one that is off it.
+    mixed = cv2.dilate(outline.view(np.uint8), _square(settings.outline_px))
+    moving = answers.moving & (mixed == 0)
+    cells = evidence_map(answers.p_nearer, answers.supported, moving, settings)
     return ZeroFlow(
         p_nearer=answers.p_nearer,
         supported=answers.supported,
-        moving=answers.moving,
-        outline=_outline(answers, flow.warp_inverse_depth, settings),
+        moving=moving,
+        outline=outline,
         cells=cells,
         inverse_depth=answers.inverse_depth,
         inverse_depth_std=answers.inverse_depth_std,
@@ -118,8 +122,7 @@ def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) 
     with np.errstate(invalid="ignore"):
         farther = depth + np.float32(2.0) * answers.inverse_depth_std < np.float32(fixated)
         nearer = depth > np.float32(fixated)
-    reach = np.ones((2 * settings.outline_px + 1,) * 2, np.uint8)
-    near_farther = cv2.dilate((farther & answers.supported).view(np.uint8), reach)
+    near_farther = cv2.dilate((farther & answers.supported).view(np.uint8), _square(settings.outline_px))
     return nearer & near_farther.view(np.bool_)
 
 
@@ -195,6 +198,11 @@ def widened_on_grid(mask: MaskArray, shape: tuple[int, ...], widen_px: int) -> M
     if widen_px > 0:
         grid = np.asarray(cv2.dilate(grid, _disc(widen_px)), np.uint8)
     return grid.view(np.bool_)
+
+
+@lru_cache(maxsize=8)
+def _square(reach: int) -> ImageArray:
+    return np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
 
 
 @lru_cache(maxsize=8)
