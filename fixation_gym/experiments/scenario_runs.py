@@ -154,9 +154,7 @@ def run_clear(rig: ScenarioRig, variant: str, rng: np.random.Generator) -> dict[
             )
         points, evidence = believed_points(memory, settings)
         in_camera = transform(inverse(percept.T_base_cam), points)
-        term = obstacle_term(
-            in_camera, evidence, percept.fixation.distance_m, TOOL_IN_CAMERA[2], gains.obstacle_margin
-        )
+        term = obstacle_term(in_camera, evidence, percept.fixation.distance_m, TOOL_IN_CAMERA[2], gains.obstacle_margin)
         now = {"map": bool((cells > _FRONT_CELL).any()), "path": term.evidence > gains.obstacle_evidence}
         alarms.update(name for name in now if now[name] and not before[name])
         before = now

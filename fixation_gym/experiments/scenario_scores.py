@@ -80,7 +80,9 @@ def _side(depth: FloatArray, target_depth: float) -> FloatArray:
 
 def _is_thing(owner: np.ndarray) -> MaskArray:
     """Obstacles, table, room and target: not the robot."""
-    robot = np.char.startswith(owner, "robot") | np.char.startswith(owner, "gripper") | np.char.startswith(owner, "fixed")
+    robot = (
+        np.char.startswith(owner, "robot") | np.char.startswith(owner, "gripper") | np.char.startswith(owner, "fixed")
+    )
     return ~robot & (owner != "")
 
 
