@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MUJOCO_FILES = {f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "contacts", "rendering")}
+MUJOCO_FILES = {f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "contacts", "rendering", "truth_view")}
 FORBIDDEN = {
     "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
     "fixation_gym/control": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),

@@ -56,6 +56,7 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
     totals: dict[str, Counter[str]] = {rule: Counter() for rule in RULES}
     records = [_Record() for _ in instance.scene.obstacles]
     frames = unknown = asked = moving = 0
+    distance_errors: list[float] = []
     for number, look in enumerate(rig.run(instance, rng)):
         settled = look.time >= SETTLED_S
         if settled and number % _EVERY:
@@ -67,6 +68,7 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
         if not settled:
             continue
         frames += 1
+        distance_errors.append(abs(1.0 / (look.percept.flow.warp_inverse_depth * look.target_depth) - 1.0))
         for rule, counts in pixel_counts(look, answers).items():
             totals[rule].update(counts)
         still = answers.side != 0.0
@@ -82,6 +84,7 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
         "pixels": asked,
         "unknown": unknown,
         "falsely_moving": moving,
+        "distance_error": float(np.median(distance_errors)),
         "rules": {rule: dict(counts) for rule, counts in totals.items()},
         "objects": [item for item in objects if item is not None],
     }

@@ -25,7 +25,7 @@ Rule = Literal["paper", "exact"]
 RULES: tuple[Rule, ...] = ("paper", "exact")
 DEPTH_MARGIN = 0.10
 INNER_PX = 3
-"""Inner pixels are farther than this from depth edges, px of the flow grid (6 px of the frames that flow is made of)."""
+"""Inner pixels are farther than this from depth edges, px of the flow grid: 6 px of the frames that flow is made of."""
 LEAST_REGION_PX = 40
 """Smaller visible parts of obstacles are not asked about, px of the flow grid."""
 _EDGE = 0.04
