@@ -105,6 +105,14 @@ class _View:
         depths = self.depths(obstacle)
         return bool(depths.max() < 1.0 - _MARGIN if in_front else depths.min() > 1.0 + _MARGIN)
 
+    def is_across(self, obstacle: ObstacleSpec) -> bool:
+        """Whether the line of sight to the target passes through an obstacle's box."""
+        box, eye = obstacle.box, self.T_base_cam[:3, 3]
+        line = np.linspace(eye, np.array(self.target.position), 200)[:-20] - box.centre
+        c, s = math.cos(box.yaw), math.sin(box.yaw)
+        along = line @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return bool(np.any(np.all(np.abs(along) < box.half_extent, axis=1)))
+
     def facing(self, position: FloatArray) -> float:
         """Yaw of a thing whose x axis points to the camera."""
         offset = self.T_base_cam[:3, 3] - position
@@ -182,8 +190,13 @@ def _opaque_scene(view: _View, variant: str, rng: np.random.Generator) -> list[O
 def _see_through_scene(view: _View, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
     """One across the line of sight, or at the border, and something solid behind."""
     sign = float(rng.choice((-1.0, 1.0)))
-    x = sign * rng.uniform(*_BORDER) if variant == "border" else rng.uniform(-0.05, 0.05)
-    return _complete([_standing(view, "translucent", True, float(x), rng), _solid(view, variant, False, -sign, rng)])
+    glass = None
+    for _ in range(_ATTEMPTS_EACH):
+        x = sign * rng.uniform(*_BORDER) if variant == "border" else rng.uniform(-0.05, 0.05)
+        drawn = _standing(view, "translucent", True, float(x), rng)
+        if drawn is not None and glass is None and (variant == "border" or view.is_across(drawn)):
+            glass = drawn
+    return _complete([glass, _solid(view, variant, False, -sign, rng)])
 
 
 def _mirror_scene(view: _View, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
