@@ -68,7 +68,9 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
         if not settled:
             continue
         frames += 1
-        distance_errors.append(abs(1.0 / (look.percept.flow.warp_inverse_depth * look.target_depth) - 1.0))
+        fixated = look.percept.zfc.fixated_inverse_depth
+        if fixated > 0.0:
+            distance_errors.append(abs(1.0 / (fixated * look.target_depth) - 1.0))
         for rule, counts in pixel_counts(look, answers).items():
             totals[rule].update(counts)
         still = answers.side != 0.0
@@ -84,7 +86,7 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
         "pixels": asked,
         "unknown": unknown,
         "falsely_moving": moving,
-        "distance_error": float(np.median(distance_errors)),
+        "distance_error": float(np.median(distance_errors)) if distance_errors else None,
         "rules": {rule: dict(counts) for rule, counts in totals.items()},
         "objects": [item for item in objects if item is not None],
     }

@@ -87,7 +87,7 @@ def _is_thing(owner: np.ndarray) -> MaskArray:
 
 
 def _edges(depth: FloatArray) -> MaskArray:
-    small = np.float32(depth)
+    small = depth.astype(np.float32)
     kernel = np.ones((3, 3), np.uint8)
     return np.asarray(cv2.dilate(small, kernel) > (1.0 + 3.0 * _EDGE) * cv2.erode(small, kernel))
 
@@ -101,7 +101,7 @@ def calls(look: Look) -> dict[Rule, MaskArray]:
     """Pixels that each rule calls nearer, shape (h, w); only those that are ``answered`` count."""
     percept = look.percept
     with np.errstate(invalid="ignore"):
-        exact = percept.zfc.inverse_depth > percept.flow.warp_inverse_depth
+        exact = percept.zfc.inverse_depth > percept.zfc.fixated_inverse_depth
     return {"paper": dot_product_front(percept.flow, look.twist), "exact": exact}
 
 
@@ -139,8 +139,8 @@ def votes(look: Look, region: MaskArray, settings: VoteSettings) -> dict[Rule, t
     """Votes for front and behind in a region, by each rule; the paper's has neither probability nor own motion."""
     zfc = look.percept.zfc
     supported = zfc.supported & region
-    paper = np.count_nonzero(supported & calls(look)["paper"])
+    paper = int(np.count_nonzero(supported & calls(look)["paper"]))
     return {
-        "paper": (paper, int(np.count_nonzero(supported)) - paper),
+        "paper": (float(paper), float(np.count_nonzero(supported) - paper)),
         "exact": region_votes(zfc, region, settings),
     }

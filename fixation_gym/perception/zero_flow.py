@@ -61,6 +61,8 @@ class ZeroFlow:
     """Estimated inverse depth, shape (h, w), 1/m; NaN without evidence."""
     inverse_depth_std: Float32Array
     """Its standard deviation, shape (h, w), 1/m; inf where nothing is known."""
+    fixated_inverse_depth: float
+    """Inverse depth of the fixated object that the pixels were compared with, 1/m; 0 if nothing could be tested."""
 
 
 def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
@@ -73,6 +75,7 @@ def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
         cells=np.full((CELLS, CELLS), UNKNOWN, np.uint8),
         inverse_depth=np.full((height, width), np.nan, np.float32),
         inverse_depth_std=np.full((height, width), np.inf, np.float32),
+        fixated_inverse_depth=0.0,
     )
 
 
@@ -100,7 +103,7 @@ def zero_flow_test(
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
     answers = pixel_answers(flow, usable, question)
-    outline = _outline(answers, flow.warp_inverse_depth, settings)
+    outline = _outline(answers, gaze.inverse_distance, settings)
     # A window that holds two motions along one epipolar line solves for one that is off it.
     mixed = cv2.dilate(outline.view(np.uint8), _square(settings.outline_px))
     moving = answers.moving & (mixed == 0)
@@ -113,6 +116,7 @@ def zero_flow_test(
         cells=cells,
         inverse_depth=answers.inverse_depth,
         inverse_depth_std=answers.inverse_depth_std,
+        fixated_inverse_depth=gaze.inverse_distance,
     )
 
 
