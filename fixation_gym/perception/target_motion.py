@@ -16,7 +16,7 @@ from fixation_gym.types import FloatArray, MaskArray
 
 InverseDepth = tuple[float, float]
 """Value and standard deviation, 1/m."""
-_QUANTILES = (0.2, 0.4, 0.6)
+_QUANTILES = (0.15, 0.3, 0.45)
 """Of the pixels' inverse depths, weighted: low, because edges shared with what covers the target belong to that."""
 _LEAST_PIXELS = 8
 _LEAST_RELATIVE_STD = 0.02
