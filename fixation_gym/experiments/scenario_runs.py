@@ -130,7 +130,7 @@ def _described(obstacle: ObstacleSpec, record: _Record, instance: Instance, inde
         "nearness": nearness,
         "pixels": float(np.mean(record.pixels)),
         "verdicts": {rule: dict(counts) for rule, counts in record.verdicts.items()},
-        "final": {rule: decide(*record.summed[rule], _VOTE).value for rule in RULES},
+        "final": {rule: decide(sums[0], sums[1], _VOTE).value for rule, sums in record.summed.items()},
         "first_call_s": record.first,
     }
 

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
-from fixation_gym.control.corridor import approach_directions
-from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, obstacle_shape, target_shape
-from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, ObstacleSpec, SceneSpec, TargetSpec
-from fixation_gym.geometry.rigid import inverse, look_at, transform
+from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, obstacle_shape
+from fixation_gym.envs.scene import ObstacleSpec, SceneSpec
+from fixation_gym.experiments.scenario_view import MARGIN, SceneView, sample_view
+from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.types import FloatArray
 
 SCENES = ("opaque", "see_through", "mirror", "reflection")
@@ -33,11 +32,9 @@ _ONSET_S = 0.2
 """Time to get to full speed."""
 _TO_AND_FRO_RATE = 0.8
 """rad/s."""
-_MARGIN = 0.12
 _TEXTURES = ("wood_light", "wood_dark", "bricks", "metal")
 _SIDE, _BORDER = (0.10, 0.26), (0.30, 0.46)
 """Horizontal image position of things, normalised; the image ends at 0.52."""
-_VISIBLE_Y = 0.36
 _SPEED = (0.02, 0.10)
 """Of the moving obstacle, m/s."""
 _ATTEMPTS, _ATTEMPTS_EACH = 2000, 40
@@ -75,50 +72,6 @@ class Instance:
         return speed * np.array([math.cos(angle), math.sin(angle), forward if self.approach else 0.0])
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """Camera and target of an instance that is being drawn."""
-
-    T_base_cam: FloatArray
-    target: TargetSpec
-    depth: float
-
-    def standing(self, x: float, depth: float, half_height: float) -> FloatArray | None:
-        """Centre in base of a thing on the table at image column x and some depth; None if out of sight."""
-        rotation, eye = self.T_base_cam[:3, :3], self.T_base_cam[:3, 3]
-        height = TABLE_HEIGHT + half_height - eye[2]
-        y = (height / depth - rotation[2, 2]) / rotation[2, 1]
-        if abs(y) > _VISIBLE_Y:
-            return None
-        return eye + depth * (rotation @ np.array([x, y, 1.0]))
-
-    def depths(self, obstacle: ObstacleSpec) -> FloatArray:
-        """Depth of the corners of an obstacle's box, relative to the target's."""
-        half = np.array(obstacle_shape(obstacle.kind, obstacle.shape).half_extent) * obstacle.scale
-        corners = np.array(list(product((-1.0, 1.0), repeat=3))) * half
-        c, s = math.cos(obstacle.yaw), math.sin(obstacle.yaw)
-        turned = corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        return transform(inverse(self.T_base_cam), turned + obstacle.position)[:, 2] / self.depth
-
-    def is_clearly(self, obstacle: ObstacleSpec, in_front: bool) -> bool:
-        """Whether all of an obstacle is nearer, or farther, than the target by the margin."""
-        depths = self.depths(obstacle)
-        return bool(depths.max() < 1.0 - _MARGIN if in_front else depths.min() > 1.0 + _MARGIN)
-
-    def is_across(self, obstacle: ObstacleSpec) -> bool:
-        """Whether the line of sight to the target passes through an obstacle's box."""
-        box, eye = obstacle.box, self.T_base_cam[:3, 3]
-        line = np.linspace(eye, np.array(self.target.position), 200)[:-20] - box.centre
-        c, s = math.cos(box.yaw), math.sin(box.yaw)
-        along = line @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return bool(np.any(np.all(np.abs(along) < box.half_extent, axis=1)))
-
-    def facing(self, position: FloatArray) -> float:
-        """Yaw of a thing whose x axis points to the camera."""
-        offset = self.T_base_cam[:3, 3] - position
-        return math.atan2(offset[1], offset[0])
-
-
 def sample_instance(scene: str, variant: str, rng: np.random.Generator) -> Instance:
     """Draw an instance of one of ``SCENES`` or ``CLEAR`` in one of ``VARIANTS``.
 
@@ -126,7 +79,7 @@ def sample_instance(scene: str, variant: str, rng: np.random.Generator) -> Insta
         RuntimeError: if none is found.
     """
     for _ in range(_ATTEMPTS):
-        view = _sample_view(rng)
+        view = sample_view(rng)
         obstacles = _OBSTACLES[scene](view, variant, rng)
         if obstacles is None or not _has_room(obstacles, np.array(view.target.position)):
             continue
@@ -149,21 +102,7 @@ def sample_instance(scene: str, variant: str, rng: np.random.Generator) -> Insta
     raise RuntimeError(f"no instance of scene {scene!r}, variant {variant!r} found in {_ATTEMPTS} draws")
 
 
-def _sample_view(rng: np.random.Generator) -> _View:
-    shape = target_shape(str(rng.choice(("box", "cylinder", "ball", "ring", "duck"))))
-    scale = float(rng.uniform(0.6, 1.0))
-    x, y = (float(rng.uniform(*bounds)) for bounds in TARGET_REGION)
-    position = (x, y, TABLE_HEIGHT + shape.half_extent[2] * scale)
-    target = TargetSpec(shape.name, (scale, scale, scale), position, float(rng.uniform(-math.pi, math.pi)))
-    azimuth = math.atan2(y, x) + math.radians(rng.uniform(25.0, 60.0))
-    elevation = math.radians(rng.uniform(32.0, 45.0))
-    depth = float(rng.uniform(0.42, 0.52))
-    centre = np.array(position)
-    eye = centre + depth * approach_directions(np.array([azimuth]), np.array([elevation]))[0]
-    return _View(look_at(eye, centre, np.array([0.0, 0.0, 1.0])), target, depth)
-
-
-def _scene(view: _View, obstacles: tuple[ObstacleSpec, ...], rng: np.random.Generator) -> SceneSpec:
+def _scene(view: SceneView, obstacles: tuple[ObstacleSpec, ...], rng: np.random.Generator) -> SceneSpec:
     eye = view.T_base_cam[:3, 3]
     light = rng.uniform(-0.5, 0.5, 2)
     return SceneSpec(
@@ -179,7 +118,7 @@ def _scene(view: _View, obstacles: tuple[ObstacleSpec, ...], rng: np.random.Gene
 # -- obstacles of the four scenes --------------------------------------------------------------------------------
 
 
-def _opaque_scene(view: _View, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
+def _opaque_scene(view: SceneView, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
     """Two in front, one on each side, and two behind."""
     signs = rng.permutation([-1.0, 1.0])
     obstacles = [_solid(view, variant, True, sign, rng) for sign in signs]
@@ -187,7 +126,7 @@ def _opaque_scene(view: _View, variant: str, rng: np.random.Generator) -> list[O
     return _complete(obstacles)
 
 
-def _see_through_scene(view: _View, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
+def _see_through_scene(view: SceneView, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
     """One across the line of sight, or at the border, and something solid behind."""
     sign = float(rng.choice((-1.0, 1.0)))
     glass = None
@@ -199,7 +138,7 @@ def _see_through_scene(view: _View, variant: str, rng: np.random.Generator) -> l
     return _complete([glass, _solid(view, variant, False, -sign, rng)])
 
 
-def _mirror_scene(view: _View, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
+def _mirror_scene(view: SceneView, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
     """A mirror beside the line of sight, something solid behind and, on the other side, in front."""
     sign = float(rng.choice((-1.0, 1.0)))
     x = sign * rng.uniform(*(_BORDER if variant == "border" else (0.20, 0.30)))
@@ -207,7 +146,7 @@ def _mirror_scene(view: _View, variant: str, rng: np.random.Generator) -> list[O
     return _complete([mirror, _solid(view, variant, True, -sign, rng), _solid(view, variant, False, -sign, rng)])
 
 
-def _reflection_scene(view: _View, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
+def _reflection_scene(view: SceneView, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
     """A mirror in front that shows a solid thing: the image appears in front, where the mirror is, but lies behind."""
     sign = float(rng.choice((-1.0, 1.0)))
     mirror = None
@@ -230,14 +169,14 @@ def _reflection_scene(view: _View, variant: str, rng: np.random.Generator) -> li
     place = image - 2.0 * ((image - centre) @ normal) * normal
     room = float(np.linalg.norm((place - eye)[:2]))  # for the arm
     fits = through[2] < eye[2] and (image - centre) @ normal < 0.0 and room > 0.22
-    if not (fits and view.is_clearly(mirror, True) and view.depths(seen).mean() > 1.0 + _MARGIN):
+    if not (fits and view.is_clearly(mirror, True) and view.depths(seen).mean() > 1.0 + MARGIN):
         return None
     there = (float(place[0]), float(place[1]), solid.position[2])
     return [mirror, _changed(solid, there, 2.0 * mirror.yaw - solid.yaw)]
 
 
 def _solid(
-    view: _View,
+    view: SceneView,
     variant: str,
     in_front: bool,
     sign: float,
@@ -256,7 +195,7 @@ def _solid(
 
 
 def _standing(
-    view: _View,
+    view: SceneView,
     kind: str,
     in_front: bool,
     x: float,
@@ -290,7 +229,7 @@ def _standing(
     return obstacle if view.is_clearly(obstacle, in_front) and not hides else None
 
 
-def _sample_velocity(view: _View, obstacle: ObstacleSpec, rng: np.random.Generator) -> FloatArray | None:
+def _sample_velocity(view: SceneView, obstacle: ObstacleSpec, rng: np.random.Generator) -> FloatArray | None:
     """Horizontal velocity; what stands in front stays there and, if solid, beside the line of sight."""
     speed, direction = rng.uniform(*_SPEED), rng.uniform(0.0, 2.0 * math.pi)
     velocity = speed * np.array([math.cos(direction), math.sin(direction), 0.0])
@@ -332,7 +271,7 @@ def _has_room(obstacles: list[ObstacleSpec], target: FloatArray) -> bool:
     return True
 
 
-def _clear_scene(view: _View, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
+def _clear_scene(view: SceneView, variant: str, rng: np.random.Generator) -> list[ObstacleSpec] | None:
     return []
 
 

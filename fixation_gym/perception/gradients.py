@@ -142,8 +142,7 @@ def _level_sums(
 def _raise_information(sums: Float32Array, least: np.float32) -> None:
     """Add what J, sums[:3], lacks to inform by ``least`` in every direction: its smaller eigenvalue is at least that.
 
-    Along a weak edge the noise taken out may exceed what was there. J would be indefinite, and the motion along the
-    edge would be hundreds of px with a small stated error.
+    Along a weak edge the noise taken out may exceed what was there; motion along it would seem huge and well known.
     """
     xx, xy, yy = sums[:3]
     np.maximum(xx, least, out=xx)

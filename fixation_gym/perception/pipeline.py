@@ -37,7 +37,6 @@ from fixation_gym.perception.zero_flow import (
 )
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 
-
 _OWN_DEPTHS = 5
 """Frames over which the motion of the target's own pixels is believed."""
 
