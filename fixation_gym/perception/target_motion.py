@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
 from fixation_gym.geometry.interaction import epipolar_direction
@@ -19,6 +20,8 @@ InverseDepth = tuple[float, float]
 _QUANTILES = (0.15, 0.3, 0.45)
 """Of the pixels' inverse depths, weighted: low, because edges shared with what covers the target belong to that."""
 _LEAST_PIXELS = 8
+_WINDOW = np.ones((5, 5), np.uint8)
+"""Window of the flow, px of its grid."""
 _LEAST_RELATIVE_STD = 0.02
 _GATE = 3.0
 """Contradictions count from this many standard deviations on."""
@@ -32,7 +35,8 @@ def target_inverse_depth(flow: Flow, twist: FloatArray, target: MaskArray) -> In
         twist: mean camera twist [v, w] over the frames of the flow, shape (6,), m/s and rad/s.
         target: pixels of the target, shape (h, w).
     """
-    rows, columns = np.nonzero(target & flow.overlap)
+    inner = cv2.erode((target & flow.overlap).view(np.uint8), _WINDOW)  # at its outline, the background moves, too
+    rows, columns = np.nonzero(inner)
     if len(rows) < _LEAST_PIXELS:
         return None
     x, y = (axis[rows, columns] for axis in flow.intrinsics.grid)
