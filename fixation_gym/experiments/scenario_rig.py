@@ -87,15 +87,11 @@ class ScenarioRig:
             for body, obstacle in zip(self.sim.obstacles, instance.scene.obstacles, strict=True):
                 for name, _ in _trimmings(body, obstacle):
                     model.geom_group[model.geom(name).id] = HIDDEN_GROUP
-        if instance.mover is not None:
-            body = self.sim.obstacles[instance.mover]
-            model.body_gravcomp[model.body(body).id] = 1.0
-            self.sim.data.qpos[self._address(instance) + 2] += 0.002  # no friction on the way
+        if instance.mover is not None:  # neither contacts nor weight, so that it keeps its velocity
+            body = model.body(self.sim.obstacles[instance.mover]).id
+            model.geom_contype[model.geom_bodyid == body] = model.geom_conaffinity[model.geom_bodyid == body] = 0
+            self.sim.data.xfrc_applied[body, :3] = -model.body_mass[body] * model.opt.gravity
         self.sim.step(np.zeros(6), -1.0, self.sim.substeps)
-
-    def _address(self, instance: Instance) -> int:
-        body = self.sim.obstacles[instance.mover or 0]
-        return int(self.sim.model.joint(f"{body}_joint").qposadr[0])
 
     def _image(self, qpos: FloatArray) -> ImageArray:
         return self._view.render(qpos, with_reflections=self._mirror)
