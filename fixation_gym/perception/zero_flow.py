@@ -104,9 +104,7 @@ def zero_flow_test(
     question = _question(flow, gaze, settings, support_height_m)
     answers = pixel_answers(flow, usable, question)
     outline = _outline(answers, gaze.inverse_distance, settings)
-    # A window that holds two motions along one epipolar line solves for one that is off it.
-    mixed = cv2.dilate(outline.view(np.uint8), _square(settings.outline_px))
-    moving = answers.moving & (mixed == 0)
+    moving = answers.moving & ~_mixed(answers.moving, outline, settings)
     cells = evidence_map(answers.p_nearer, answers.supported, moving, settings)
     return ZeroFlow(
         p_nearer=answers.p_nearer,
@@ -128,6 +126,16 @@ def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) 
         nearer = depth > np.float32(fixated)
     near_farther = cv2.dilate((farther & answers.supported).view(np.uint8), _square(settings.outline_px))
     return nearer & near_farther.view(np.bool_)
+
+
+def _mixed(moving: MaskArray, outline: MaskArray, settings: ZeroFlowSettings) -> MaskArray:
+    """Pixels near outlines that seem to move by themselves, but are too few side by side to be a thing, shape (h, w).
+
+    A window that holds two motions along one epipolar line solves for one that is off it.
+    """
+    near_outline = cv2.dilate(outline.view(np.uint8), _square(settings.outline_px))
+    things = cv2.morphologyEx(moving.view(np.uint8), cv2.MORPH_OPEN, _square(settings.outline_px))
+    return near_outline.view(np.bool_) & (things == 0)
 
 
 def _question(flow: Flow, gaze: Gaze, settings: ZeroFlowSettings, support_height_m: float | None) -> PixelQuestion:
