@@ -141,6 +141,42 @@ class Distance:
 
 
 @dataclass(frozen=True)
+class Scenarios:
+    """What is in front of the fixated object, in four hard scenes. The same command again resumes."""
+
+    quick: bool = False
+    """Three instances of every scene and variant instead of twenty."""
+    instances: int | None = None
+    """Random instances of every scene and variant; 20 by default, 3 with --quick."""
+    seed: int = 0
+    """Chooses the block of seeds: instance i has seed 100000 * SEED + i."""
+    noise: str = "nominal"
+    """Sensor noise: ideal, nominal or conservative."""
+    workers: int = 1
+    """Number of processes."""
+    film: bool = True
+    """Make figure and videos."""
+    out: Path = Path("out/scenarios")
+    """Folder of the results."""
+
+    def run(self) -> int:
+        """Look and print the table."""
+        from fixation_gym.experiments.scenario_scenes import SCENES
+        from fixation_gym.experiments.scenarios import CSV_FILE, FIGURE_FILE, ScenariosConfig, measure, video_file
+
+        config = ScenariosConfig(self.quick, self.instances, self.seed, self.noise, self.workers, self.film)
+        config.check()
+        select_backend()
+        from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.scenario_statistics import format_table
+
+        print(format_table(measure(config, self.out)))
+        pictures = (FIGURE_FILE, *map(video_file, SCENES)) if self.film else ()
+        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, *pictures)))
+        return 0
+
+
+@dataclass(frozen=True)
 class Bench:
     """Time every stage and comparable environments in one run: table of medians, ratios and a bar chart."""
 
@@ -189,6 +225,7 @@ Commands = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
+    | Annotated[Scenarios, tyro.conf.subcommand("scenarios")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )

@@ -53,10 +53,10 @@ def test_a_missing_or_unknown_command_names_the_commands(
 ) -> None:
     assert cli.main(arguments) == 2
     line = error_line(capsys)
-    assert all(command in line for command in ("demo", "evaluate", "distance", "doctor"))
+    assert all(command in line for command in ("demo", "evaluate", "distance", "scenarios", "doctor"))
 
 
-@pytest.mark.parametrize("command", ["demo", "evaluate", "distance", "doctor"])
+@pytest.mark.parametrize("command", ["demo", "evaluate", "distance", "scenarios", "doctor"])
 def test_an_output_folder_that_cannot_be_written_is_one_line(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -66,7 +66,7 @@ def test_an_output_folder_that_cannot_be_written_is_one_line(
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.parametrize("command", ["demo", "evaluate", "distance"])
+@pytest.mark.parametrize("command", ["demo", "evaluate", "distance", "scenarios"])
 def test_a_missing_gl_library_is_one_line_and_leaves_no_folder(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,7 +11,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 MUJOCO_FILES = {
-    f"fixation_gym/envs/{name}.py" for name in ("pick_sim", "task_model", "contacts", "rendering", "truth_view")
+    f"fixation_gym/envs/{name}.py"
+    for name in ("pick_sim", "task_model", "contacts", "rendering", "truth_view", "privileged_map")
 }
 FORBIDDEN = {
     "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),

@@ -127,9 +127,9 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         """Draw a new scene. ``options`` are not used."""
         observation, info = self.env.reset(seed=seed, options=options)
         if self._shown == "privileged":
-            from fixation_gym.envs.truth_view import TruthView
+            from fixation_gym.envs.privileged_map import ObstacleDepth
 
-            self._truth = TruthView(self._base.wrist_view, self._base.model)
+            self._truth = ObstacleDepth(self._base.wrist_view, self._base.model)
         self._manoeuvre = None
         self._moment = self._take_in(observation, info)
         return self._observation(), info

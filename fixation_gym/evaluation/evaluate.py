@@ -6,17 +6,15 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
+from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.report import summarise
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeKey, EpisodeStore, write_json
@@ -124,16 +122,20 @@ def evaluate(
     started = time.monotonic()
     keys = config.episode_keys()
     with EpisodeStore(out, {"command": "evaluate", **config.run_description()}) as store:
-        cells = [config.cell(key) for key in keys if key not in store.finished]
-        done = [store.finished[key] for key in keys if key in store.finished]
-        progress = _Progress(len(keys), done)
-        with closing(progress), closing(workers.run_cells(cells, config.workers, config.backend, run)) as values:
-            for result in map(EpisodeResult.from_json, values):
-                store.append(result)
-                progress.add(result)
+        finished = store.finished
+        resumed = run_missing(
+            store,
+            {key: config.cell(key) for key in keys},
+            run,
+            parse=EpisodeResult.from_json,
+            note=lambda result: f"{result.scenario}, success {_successes(finished, keys)}",
+            unit="episode",
+            processes=config.workers,
+            backend=config.backend,
+        )
         workers.close_worlds()
         summary = summary_of(config, [store.finished[key] for key in keys], time.monotonic() - started)
-        summary["episodes_resumed"] = len(done)
+        summary["episodes_resumed"] = resumed
         write_json(out / SUMMARY_FILE, summary)
     return summary
 
@@ -153,17 +155,7 @@ def summary_of(config: EvaluationConfig, results: Sequence[EpisodeResult], wall_
     }
 
 
-class _Progress:
-    """A progress bar that also counts successes."""
-
-    def __init__(self, total: int, done: Sequence[EpisodeResult]) -> None:
-        self._successes = sum(result.success for result in done)
-        self._bar = tqdm(total=total, initial=len(done), unit="episode", dynamic_ncols=True)
-
-    def add(self, result: EpisodeResult) -> None:
-        self._successes += result.success
-        self._bar.update()
-        self._bar.set_postfix_str(f"{result.scenario}, success {self._successes}/{self._bar.n}")
-
-    def close(self) -> None:
-        self._bar.close()
+def _successes(finished: Mapping[EpisodeKey, EpisodeResult], keys: Sequence[EpisodeKey]) -> str:
+    """Successes so far among the episodes that are asked for, as k/n."""
+    done = [finished[key] for key in keys if key in finished]
+    return f"{sum(result.success for result in done)}/{len(done)}"

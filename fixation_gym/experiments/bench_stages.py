@@ -42,13 +42,13 @@ def stages(camera: Intrinsics, observations: Sequence[Observation]) -> Iterator[
     halvings = math.ceil(math.log2(max(1.0, camera.width / _SETTINGS.flow.max_width)))
     working = camera.scaled(camera.height >> halvings, camera.width >> halvings)
     scratch = Scratch()
-    greys = [[prepare_grey(rgb, working.height, working.width, _SETTINGS.flow) for rgb in m.rgbs] for m in moments]
+    greys = [[prepare_grey(rgb, working.height, working.width) for rgb in m.rgbs] for m in moments]
 
     def flow_of(index: int) -> Any:
         moment = moments[index]
         middle = moment.poses[1]
         maps = [plane_homography(inverse(moment.poses[k]) @ middle, moment.inverse_distance, working) for k in (0, 2)]
-        last = prepare_grey(moment.rgbs[2], working.height, working.width, _SETTINGS.flow)
+        last = prepare_grey(moment.rgbs[2], working.height, working.width)
         frames, times = [*greys[index][:2], last], list(moment.times)
         inverse_distance = moment.inverse_distance
         flow = estimate_flow(frames, times, working, (maps[0], maps[1]), inverse_distance, _SETTINGS.flow, scratch)

@@ -6,18 +6,17 @@ import atexit
 import os
 import time
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
-from tqdm import tqdm
 
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders, write_json
 from fixation_gym.experiments.distance_statistics import summarise, write_csv
 from fixation_gym.experiments.duck_print import valid_widths
@@ -189,20 +188,22 @@ def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, A
     )
     with store:
         check_no_folders(out, (CSV_FILE, FIGURE_FILE))
-        missing = [cell for cell in cells if cell_key(cell) not in store.finished]
-        progress = tqdm(total=len(cells), initial=len(cells) - len(missing), unit="sequence", dynamic_ncols=True)
-        with closing(progress), closing(workers.run_cells(missing, config.workers, "loky", run)) as values:
-            for value in values:
-                store.append(value)
-                progress.update()
-                progress.set_postfix_str(f"{value['distance_m']:g} m, {value['motion']}")
+        resumed = run_missing(
+            store,
+            {cell_key(cell): cell for cell in cells},
+            run,
+            parse=dict,
+            note=lambda value: f"{value['distance_m']:g} m, {value['motion']}",
+            unit="sequence",
+            processes=config.workers,
+        )
         close_rigs()
         summary = {
             **summarise([store.finished[cell_key(cell)] for cell in cells], config.noise),
             **config.run_description(),
             "quick": config.quick,
             "seeds": config.seed_count,
-            "sequences_resumed": len(cells) - len(missing),
+            "sequences_resumed": resumed,
             "wall_s": time.monotonic() - started,
         }
         write_json(out / SUMMARY_FILE, summary)

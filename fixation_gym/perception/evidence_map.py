@@ -37,6 +37,8 @@ class ZeroFlowSettings:
     """... and above this motion, px of the flow grid per frame interval."""
     target_margin_px: int = 3
     """The target is widened by this much, px of the flow grid: windows at its outline mix it with what is behind."""
+    outline_px: int = 3
+    """Reach of a window beyond its centre, px of the flow grid: what an outline moves like may be its neighbour's."""
     cell_min_share: float = 0.06
     """Least share of a cell's pixels that must have evidence."""
     cell_min_front: float = 0.15

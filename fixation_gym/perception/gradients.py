@@ -2,6 +2,10 @@
 
 Matched derivative filters (Simoncelli & Farid 1997: 5 taps in space, 3 in time), made "unit": a ramp of slope 1 has
 derivative 1 in x, y and t alike, so that unequal lengths do not shorten the flow.
+
+The products are taken about the means of their window. This is the least-squares fit of a motion and a change of
+brightness that the whole window shares: exposure, and highlights and shading that stay in the image while surfaces move
+through it, pass for motion otherwise.
 """
 
 from __future__ import annotations
@@ -35,13 +39,11 @@ class FlowSettings:
 
     max_width: int = 320
     """Images wider than this are halved until they are not, px; the flow grid is half of that."""
-    illumination_window: int = 15
-    """Brightness that varies more slowly than over this length is ignored, px of the frames."""
     window: int = 5
     """Side of the square over which gradients are pooled, px of the flow grid."""
     levels: int = 3
     """Resolutions in steps of two; a coarse one replaces a finer one where the motion is too large for it."""
-    max_displacement: float = 1.2
+    max_displacement: float = 1.8
     """Largest residual motion trusted at a level, px of its frames per frame interval."""
     image_noise_std: float = 2.0
     """Temporal noise of the frames, grey levels (0..255)."""
@@ -118,28 +120,48 @@ def _level_sums(
     own = _SPATIAL_NOISE_GAIN * noise_std**2
     noise = _Noise(settings.noise_correlation * settings.motion_noise_std**2, temporal, own)
     height, width = smooth.shape
-    sums = np.empty((5, height // 2, width // 2), np.float32)
+    sums, windows = np.empty((5, height // 2, width // 2), np.float32), scratch.get("w", 9, height // 2, width // 2)
     # What is left on a plain surface scatters by about a third of the energy taken out; no less is ever stated.
-    least = 0.3 * own / temporal * 16 * settings.window**2
+    least = np.float32(0.3 * own / temporal * 16 * settings.window**2)
     if kernels.enabled and settings.window == kernels.WINDOW and height % 2 == 0 and width % 2 == 0:
-        pooled, limits = scratch.get("pooled", *sums.shape), np.array([least, -np.inf] * 2 + [-np.inf], np.float32)
-        taps = SPACE_PREFILTER, SPACE_DERIVATIVE
+        pooled, taps = scratch.get("pooled", *windows.shape), (SPACE_PREFILTER, SPACE_DERIVATIVE)
         kernels.pooled_products(smooth, change, *taps, tuple(np.float32(part) for part in noise), pooled)
-        kernels.window_sums(pooled, limits, sums)
+        kernels.window_sums(pooled, windows)
+        kernels.centred_sums(windows, least, sums)
         return sums
-    _plain_level_sums(smooth, change, noise, settings.window, scratch, sums)
-    np.maximum(sums[:3:2], np.float32(least), out=sums[:3:2])
+    _plain_window_sums(smooth, change, noise, settings.window, scratch, windows)
+    sx, sy, st, sw = windows[5:]
+    for plane, (first, second) in enumerate(((sx, sx), (sx, sy), (sy, sy), (sx, st), (sy, st))):
+        np.multiply(first, second, out=sums[plane])
+        sums[plane] /= sw
+        np.subtract(windows[plane], sums[plane], out=sums[plane])
+    _raise_information(sums, least)
     return sums
 
 
-def _plain_level_sums(
-    smooth: Float32Array, change: Float32Array, noise: _Noise, window: int, scratch: Scratch, sums: Float32Array
+def _raise_information(sums: Float32Array, least: np.float32) -> None:
+    """Add what J, sums[:3], lacks to inform by ``least`` in every direction: its smaller eigenvalue is at least that.
+
+    Along a weak edge the noise taken out may exceed what was there; motion along it would seem huge and well known.
+    """
+    xx, xy, yy = sums[:3]
+    np.maximum(xx, least, out=xx)
+    np.maximum(yy, least, out=yy)
+    spread = np.hypot(xx - yy, np.float32(2.0) * xy)
+    lacking = least - np.float32(0.5) * (xx + yy - spread)
+    np.maximum(lacking, np.float32(0.0), out=lacking)
+    xx += lacking
+    yy += lacking
+
+
+def _plain_window_sums(
+    smooth: Float32Array, change: Float32Array, noise: _Noise, window: int, scratch: Scratch, windows: Float32Array
 ) -> None:
-    """Write the windowed products of a level to ``sums``, with NumPy and OpenCV."""
+    """Write the windowed products and means of a level to ``windows``, with NumPy and OpenCV."""
     height, width = smooth.shape
     half_height, pad = height // 2, window // 2
-    # All planes in one image, apart by repeated border rows: one filter call instead of five.
-    stack = scratch.get("stack", 5, half_height + 2 * pad, width // 2)
+    # All planes in one image, apart by repeated border rows: one filter call instead of nine.
+    stack = scratch.get("stack", len(windows), half_height + 2 * pad, width // 2)
     pooled = stack[:, pad : pad + half_height]
     for rows in _strips(height, width):
         part = pooled[:, rows.start // 2 : rows.stop // 2]
@@ -149,7 +171,7 @@ def _plain_level_sums(
     image, ones = stack.reshape(-1, width // 2), np.ones(window, np.float32)
     filtered = scratch.get("filtered", *stack.shape)
     cv2.sepFilter2D(image, cv2.CV_32F, ones, ones, dst=filtered.reshape(image.shape), borderType=cv2.BORDER_REPLICATE)
-    sums[...] = filtered[:, pad : pad + half_height]
+    windows[...] = filtered[:, pad : pad + half_height]
 
 
 def _strips(height: int, width: int) -> list[slice]:
@@ -185,7 +207,7 @@ def _pooled_products(
     pooled: Float32Array,
     scratch: Scratch,
 ) -> None:
-    """Write the means over 2 x 2 pixels of the weighted products xx, xy, yy, xt, yt of gradients.
+    """Write means over 2 x 2 pixels: weighted products xx, xy, yy, xt, yt, weighted gradients x, y, t and the weight.
 
     Four pixels make one of the grid, whose gradient per px is twice that of the frame: a factor 16 for J, put into the
     weight. For b it is 8, so the temporal derivative comes halved.
@@ -193,7 +215,7 @@ def _pooled_products(
     Args:
         gradients: derivatives by x, y and t, each of shape (H, W); overwritten.
         noise: of the derivatives.
-        pooled: the result, shape (5, H // 2, W // 2).
+        pooled: the result, shape (9, H // 2, W // 2).
         scratch: work arrays.
     """
     ix, iy, it = gradients
@@ -209,6 +231,7 @@ def _pooled_products(
     weight *= np.float32(noise.motion / 16)
     weight += np.float32(noise.temporal / 16)
     np.reciprocal(weight, out=weight)
+    pool(weight, 8)
     for energy, plane in ((xx, 0), (yy, 2)):
         energy -= np.float32(noise.spatial)
         energy *= weight
@@ -217,7 +240,9 @@ def _pooled_products(
     xy *= weight
     pool(xy, 1)
     it *= weight
+    pool(it, 7)
     for gradient, plane in ((ix, 3), (iy, 4)):
+        pool(np.multiply(gradient, weight, out=xx), plane + 2)
         gradient *= it
         pool(gradient, plane)
 

@@ -56,7 +56,9 @@ def _repeat_border(line):
 
 @compiled
 def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
-    """Weighted products xx, xy, yy, xt, yt of gradients, averaged over 2 x 2 pixels; see ``gradients``.
+    """Weighted products xx, xy, yy, xt, yt of gradients, gradients x, y, t and weights, pooled over 2 x 2 pixels.
+
+    See ``gradients``.
 
     Args:
         smooth: frames averaged over time, shape (H, W), H and W even.
@@ -64,15 +66,16 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
         prefilter: 5 symmetric taps.
         derivative: 5 antisymmetric taps.
         noise: variances of motion and of the temporal derivative, energy of the spatial derivatives of noise.
-        pooled: result, shape (5, H // 2, W // 2).
+        pooled: result, shape (9, H // 2, W // 2).
     """
     height, width = smooth.shape
     model, temporal, own = noise[0] / np.float32(16), noise[1] / np.float32(16), noise[2]
     p0, p1, p2, d0, d1 = prefilter[0], prefilter[1], prefilter[2], derivative[3], derivative[4]
     lines = np.empty((3, width + 4), np.float32)
     s, y, t = lines[0], lines[1], lines[2]  # filtered along the column: smoothed, by y, by time
-    products = np.zeros((5, width), np.float32)
+    products = np.zeros((9, width), np.float32)
     xx, xy, yy, xt, yt = products[0], products[1], products[2], products[3], products[4]
+    sx, sy, st, sw = products[5], products[6], products[7], products[8]
     for row in range(height):
         a, b, c, d, e = _rows_around(smooth, row)
         for i in range(width):
@@ -91,21 +94,26 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
             gt = p2 * t[i + 2] + p1 * (t[i + 1] + t[i + 3]) + p0 * (t[i] + t[i + 4])
             gxx, gyy = gx * gx, gy * gy
             weight = np.float32(0.25) / (model * (gxx + gyy) + temporal)
+            wx, wy, wt = weight * gx, weight * gy, np.float32(0.5) * weight * gt
             xx[i] = keep * xx[i] + weight * (gxx - own)
-            xy[i] = keep * xy[i] + weight * gx * gy
+            xy[i] = keep * xy[i] + wx * gy
             yy[i] = keep * yy[i] + weight * (gyy - own)
-            xt[i] = keep * xt[i] + np.float32(0.5) * weight * gx * gt
-            yt[i] = keep * yt[i] + np.float32(0.5) * weight * gy * gt
+            xt[i] = keep * xt[i] + gx * wt
+            yt[i] = keep * yt[i] + gy * wt
+            sx[i] = keep * sx[i] + wx
+            sy[i] = keep * sy[i] + wy
+            st[i] = keep * st[i] + wt
+            sw[i] = keep * sw[i] + weight
         if row % 2:
-            for k in range(5):
+            for k in range(9):
                 out, line = pooled[k, row // 2], products[k]
                 for i in range(width // 2):
                     out[i] = line[2 * i] + line[2 * i + 1]
 
 
 @compiled
-def window_sums(planes, least, sums):
-    """Sums over 5 x 5 windows, the border repeated, but at least ``least`` (n,); planes and sums of shape (n, h, w)."""
+def window_sums(planes, sums):
+    """Sums over 5 x 5 windows, the border repeated; planes and sums of shape (n, h, w)."""
     count, height, width = planes.shape
     line = np.empty(width + 4, np.float32)
     for k in range(count):
@@ -116,7 +124,30 @@ def window_sums(planes, least, sums):
             _repeat_border(line)
             out = sums[k, row]
             for i in range(width):
-                out[i] = max(line[i] + line[i + 1] + line[i + 2] + line[i + 3] + line[i + 4], least[k])
+                out[i] = line[i] + line[i + 1] + line[i + 2] + line[i + 3] + line[i + 4]
+
+
+@compiled
+def centred_sums(windows, least, sums):
+    """Products about the means of each window, with at least ``least`` information in every direction.
+
+    See ``gradients``. ``windows``, shape (9, h, w), holds sums as of ``pooled_products``; the result has shape
+    (5, h, w).
+    """
+    height, width = sums.shape[1:]
+    for row in range(height):
+        sx, sy, st, sw = windows[5, row], windows[6, row], windows[7, row], windows[8, row]
+        xx, xy, yy, x, y = sums[0, row], sums[1, row], sums[2, row], sums[3, row], sums[4, row]
+        wxx, wxy, wyy = windows[0, row], windows[1, row], windows[2, row]
+        wx, wy = windows[3, row], windows[4, row]
+        for i in range(width):
+            mx, my = sx[i] / sw[i], sy[i] / sw[i]
+            a, b, c = wxx[i] - mx * sx[i], wxy[i] - mx * sy[i], wyy[i] - my * sy[i]
+            a, c = max(a, least), max(c, least)
+            spread = np.sqrt((a - c) * (a - c) + np.float32(4) * b * b)
+            lacking = max(least - np.float32(0.5) * (a + c - spread), np.float32(0))
+            xx[i], xy[i], yy[i] = a + lacking, b, c + lacking
+            x[i], y[i] = wx[i] - mx * st[i], wy[i] - my * st[i]
 
 
 @compiled

@@ -93,24 +93,18 @@ def flow_grid(frame_intrinsics: Intrinsics) -> Intrinsics:
     return frame_intrinsics.scaled(frame_intrinsics.height // 2, frame_intrinsics.width // 2)
 
 
-def prepare_grey(rgb: ImageArray, height: int, width: int, settings: FlowSettings) -> Float32Array:
-    """Grey image of the given size without its slow variations, shape (height, width), grey levels.
-
-    Highlights and shading stay in the image while surfaces move through it; on weak texture they would pass for
-    motion. They vary slowly over the image, so the local mean takes them out, and exposure changes with them.
+def prepare_grey(rgb: ImageArray, height: int, width: int) -> Float32Array:
+    """Grey image of the given size, shape (height, width), grey levels.
 
     Args:
         rgb: image of shape (H, W, 3), uint8.
         height: of the result.
         width: of the result.
-        settings: for the illumination window.
     """
     grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
     if grey.shape != (height, width):
         grey = cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
-    side = 2 * (settings.illumination_window // 2) + 1
-    mean = cv2.boxFilter(grey, cv2.CV_32F, (side, side))  # sums of integers: cheaper than of floats
-    return np.asarray(cv2.subtract(grey, mean, dst=mean, dtype=cv2.CV_32F), np.float32)
+    return grey.astype(np.float32)
 
 
 def plane_homography(T_cam_centre: FloatArray, inverse_depth: float, intrinsics: Intrinsics) -> FloatArray:

@@ -26,8 +26,19 @@ from fixation_gym.perception.optic_flow import (
 )
 from fixation_gym.perception.scratch import Float32Array, Scratch
 from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
-from fixation_gym.perception.zero_flow import Gaze, ZeroFlow, ZeroFlowSettings, unknown_zero_flow, zero_flow_test
+from fixation_gym.perception.target_motion import InverseDepth, checked_inverse_depth, target_inverse_depth
+from fixation_gym.perception.zero_flow import (
+    Gaze,
+    ZeroFlow,
+    ZeroFlowSettings,
+    unknown_zero_flow,
+    widened_on_grid,
+    zero_flow_test,
+)
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
+
+_OWN_DEPTHS = 5
+"""Frames over which the motion of the target's own pixels is believed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +124,7 @@ class Perception:
         """Forget everything seen."""
         self._frames: deque[_Frame] = deque(maxlen=3)
         self._state: DistanceState | None = None
+        self._own_depths: deque[InverseDepth] = deque(maxlen=_OWN_DEPTHS)
 
     @property
     def flow_intrinsics(self) -> Intrinsics:
@@ -131,7 +143,8 @@ class Perception:
         fixation = self._follow(observation.time, T_base_cam, segmentation)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
-        grey = prepare_grey(observation.rgb, self._working.height, self._working.width, self._settings.flow)
+            self._own_depths.clear()
+        grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         self._frames.append(_Frame(observation.time, grey, T_base_cam, segmentation))
         flow, zero_flow = self._look_for_obstacles()
         middle = self._frames[max(0, len(self._frames) - 2)]
@@ -196,8 +209,13 @@ class Perception:
             self._scratch,
         )
         if not (middle.segmentation.visible and last.segmentation.visible):
+            self._own_depths.clear()
             return flow, unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
+        own = target_inverse_depth(flow, twist, widened_on_grid(middle.segmentation.mask, shape, 0))
+        if own is not None:
+            self._own_depths.append(own)
+        inverse_distance, inverse_std = checked_inverse_depth((inverse_distance, inverse_std), self._own_depths)
         gaze = Gaze(twist, inverse_distance, inverse_std, middle.segmentation.mask, middle.T_base_cam)
         return flow, zero_flow_test(flow, gaze, settings.zero_flow, self._self_mask, self.support_height_m)
 
@@ -213,6 +231,6 @@ def _run_once() -> None:
     rgb[40:56, 40:56] = 255, 0, 0
     seen = segment(rgb, camera)
     settings, maps = FlowSettings(), (np.eye(3), np.eye(3))
-    frames = [prepare_grey(np.roll(rgb, shift, axis=1), 96, 96, settings) for shift in range(3)]
+    frames = [prepare_grey(np.roll(rgb, shift, axis=1), 96, 96) for shift in range(3)]
     flow = estimate_flow(frames, (0.0, 1.0, 2.0), camera, maps, 1.0, settings)
     zero_flow_test(flow, Gaze(np.eye(6)[0], 1.0, 0.1, seen.mask, np.eye(4)), ZeroFlowSettings(), None, 0.0)

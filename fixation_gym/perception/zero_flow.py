@@ -21,7 +21,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import epipolar_direction
 from fixation_gym.perception.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
 from fixation_gym.perception.optic_flow import Flow
-from fixation_gym.perception.pixel_test import PixelQuestion, pixel_answers
+from fixation_gym.perception.pixel_test import PixelAnswers, PixelQuestion, pixel_answers
 from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
@@ -52,12 +52,17 @@ class ZeroFlow:
     """Pixels with evidence, shape (h, w)."""
     moving: MaskArray
     """Pixels that move off their epipolar line: something moves by itself there, shape (h, w)."""
+    outline: MaskArray
+    """Pixels that seem nearer, but lie within a window's reach of something surely behind: they may show either, shape
+    (h, w). An outline belongs to the nearer thing and its motion spreads to both sides."""
     cells: ImageArray
     """The map for policies, shape (32, 32): P(nearer) * 255 where known, 128 elsewhere; moving pixels count as near."""
     inverse_depth: Float32Array
     """Estimated inverse depth, shape (h, w), 1/m; NaN without evidence."""
     inverse_depth_std: Float32Array
     """Its standard deviation, shape (h, w), 1/m; inf where nothing is known."""
+    fixated_inverse_depth: float
+    """Inverse depth of the fixated object that the pixels were compared with, 1/m; 0 if nothing could be tested."""
 
 
 def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
@@ -66,9 +71,11 @@ def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
         p_nearer=np.full((height, width), 0.5, np.float32),
         supported=np.zeros((height, width), np.bool_),
         moving=np.zeros((height, width), np.bool_),
+        outline=np.zeros((height, width), np.bool_),
         cells=np.full((CELLS, CELLS), UNKNOWN, np.uint8),
         inverse_depth=np.full((height, width), np.nan, np.float32),
         inverse_depth_std=np.full((height, width), np.inf, np.float32),
+        fixated_inverse_depth=0.0,
     )
 
 
@@ -96,15 +103,39 @@ def zero_flow_test(
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
     answers = pixel_answers(flow, usable, question)
-    cells = evidence_map(answers.p_nearer, answers.supported, answers.moving, settings)
+    outline = _outline(answers, gaze.inverse_distance, settings)
+    moving = answers.moving & ~_mixed(answers.moving, outline, settings)
+    cells = evidence_map(answers.p_nearer, answers.supported, moving, settings)
     return ZeroFlow(
         p_nearer=answers.p_nearer,
         supported=answers.supported,
-        moving=answers.moving,
+        moving=moving,
+        outline=outline,
         cells=cells,
         inverse_depth=answers.inverse_depth,
         inverse_depth_std=answers.inverse_depth_std,
+        fixated_inverse_depth=gaze.inverse_distance,
     )
+
+
+def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) -> MaskArray:
+    """Pixels that seem nearer than the fixated object, next to some that are surely farther, shape (h, w)."""
+    depth = answers.inverse_depth
+    with np.errstate(invalid="ignore"):
+        farther = depth + np.float32(2.0) * answers.inverse_depth_std < np.float32(fixated)
+        nearer = depth > np.float32(fixated)
+    near_farther = cv2.dilate((farther & answers.supported).view(np.uint8), _square(settings.outline_px))
+    return nearer & near_farther.view(np.bool_)
+
+
+def _mixed(moving: MaskArray, outline: MaskArray, settings: ZeroFlowSettings) -> MaskArray:
+    """Pixels near outlines that seem to move by themselves, but are too few side by side to be a thing, shape (h, w).
+
+    A window that holds two motions along one epipolar line solves for one that is off it.
+    """
+    near_outline = cv2.dilate(outline.view(np.uint8), _square(settings.outline_px))
+    things = cv2.morphologyEx(moving.view(np.uint8), cv2.MORPH_OPEN, _square(settings.outline_px))
+    return near_outline.view(np.bool_) & (things == 0)
 
 
 def _question(flow: Flow, gaze: Gaze, settings: ZeroFlowSettings, support_height_m: float | None) -> PixelQuestion:
@@ -179,6 +210,11 @@ def widened_on_grid(mask: MaskArray, shape: tuple[int, ...], widen_px: int) -> M
     if widen_px > 0:
         grid = np.asarray(cv2.dilate(grid, _disc(widen_px)), np.uint8)
     return grid.view(np.bool_)
+
+
+@lru_cache(maxsize=8)
+def _square(reach: int) -> ImageArray:
+    return np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
 
 
 @lru_cache(maxsize=8)

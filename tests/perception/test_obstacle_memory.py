@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,8 @@ def patch(p_nearer: float, depth: float = 0.3, relative_std: float = 0.02, half:
     where = np.s_[20 - half : 20 + half, 30 - half : 30 + half]
     probability[where], inverse_depth[where], std[where] = p_nearer, 1.0 / depth, relative_std / depth
     supported[where] = True
-    return ZeroFlow(probability, supported, empty.moving, empty.cells, inverse_depth, std)
+    changed = {"p_nearer": probability, "supported": supported, "inverse_depth": inverse_depth}
+    return replace(empty, **changed, inverse_depth_std=std)
 
 
 def see(zero_flow, frames, memory=None, start=0.0):

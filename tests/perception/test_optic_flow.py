@@ -7,7 +7,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import image_flow
 from fixation_gym.geometry.rigid import inverse
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.perception import gradients
+from fixation_gym.perception import gradients, kernels
 from fixation_gym.perception.optic_flow import estimate_flow, flow_grid, invalid_flow, plane_homography
 
 CAMERA = Intrinsics.from_fovy(120, 160, np.deg2rad(42.5))
@@ -109,3 +109,50 @@ def test_the_plane_homography_moves_points_of_the_plane_like_the_projection():
     mapped = plane_homography(T_other_centre, 2.0, CAMERA) @ [*CAMERA.project(point), 1.0]
     expected = CAMERA.project(T_other_centre[:3, :3] @ point + T_other_centre[:3, 3])
     np.testing.assert_allclose(mapped[:2] / mapped[2], expected)
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_weak_edge_never_makes_the_information_indefinite(enabled, monkeypatch):
+    monkeypatch.setattr(kernels, "enabled", enabled and kernels.enabled)
+    columns = np.arange(160, dtype=np.float32)
+    stripes = np.tile(100 + 3 * np.sin(0.5 * columns), (120, 1))  # 1-D texture, hardly above the noise
+    rng = np.random.default_rng(1)
+    turned = cv2.warpAffine(stripes, cv2.getRotationMatrix2D((80, 60), 30, 1.5), (160, 120), borderMode=cv2.BORDER_WRAP)
+    frames = [(turned + rng.normal(0, 2, turned.shape)).astype(np.float32) for _ in TIMES]
+    flow = estimate_flow(frames, TIMES, CAMERA)
+    xx, xy, yy = flow.information
+    assert (xx * yy - xy**2 > 0).all()
+    # Where nothing moves, what is stated must cover what is found.
+    nis = np.square(flow.residual[0]) / flow.residual_cov[0]
+    assert np.mean(nis[flow.overlap] > 15) < 0.02
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_shading_that_stays_while_a_weak_texture_moves_through_it_hardly_changes_the_flow(enabled, monkeypatch):
+    monkeypatch.setattr(kernels, "enabled", enabled and kernels.enabled)
+    x, y = CAMERA.grid
+    highlight = 60 * np.exp(-(x**2 + y**2) / 0.06)
+    motions = [exp_twist(np.array([0.02, 0, 0, 0, 0, 0]), t - TIMES[1]) for t in TIMES]
+    frames = [
+        (0.3 * seen_plane(inverse(motion), 0.5, noise=2.0, seed=i) + highlight).astype(np.float32)
+        for i, motion in enumerate(motions)
+    ]
+    flow = estimate_flow(frames, TIMES, CAMERA)
+    grid = flow.intrinsics
+    truth = image_flow(*grid.grid, 2.0, np.array([0.02, 0, 0, 0, 0, 0]))[0] * grid.fx
+    gain = flow.flow[flow.overlap][:, 0] / truth[flow.overlap]
+    assert np.median(gain) == pytest.approx(1.0, abs=0.06)
+
+
+def test_a_strong_edge_does_not_move_weak_texture_farther_away_than_the_window():
+    rng = np.random.default_rng(2)
+    texture = cv2.GaussianBlur(rng.normal(0, 30, (120, 160)).astype(np.float32), (0, 0), 1.5) + 100
+    frames = []
+    for k in (-1, 0, 1):
+        frame = texture + rng.normal(0, 0.5, texture.shape).astype(np.float32)
+        frame[:, : 60 + k] = 10  # a dark plain thing moves by 1 px over a resting texture
+        frames.append(frame.astype(np.float32))
+    flow = estimate_flow(frames, TIMES, CAMERA)
+    column = 30 + 5  # window of 5 px of the grid and filters of 5 px of the frame
+    rest = flow.residual[0][10:-10, column : column + 4]
+    assert np.abs(np.median(rest)) < 0.03

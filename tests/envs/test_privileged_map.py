@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.envs.config import SCENARIOS
-from fixation_gym.envs.truth_view import nearer_map
+from fixation_gym.envs.privileged_map import nearer_map
 from fixation_gym.envs.zfc_env import make_zfc_env
 
 pytestmark = pytest.mark.sim

@@ -1,0 +1,146 @@
+"""Scores of one look at a hard scene: the signs of single pixels and the verdicts on whole obstacles, both rules.
+
+Pixels are asked "nearer than the fixated object?", the table included, as the paper's rule knows no table. A pixel
+counts if its true depth differs from Z_f by more than 10 % and what it shows is one thing that stands still: not where
+see-through things show something on the other side, not the robot in a mirror, nothing that moves. On a mirror's face
+the truth is the virtual image. Obstacles count with their surface; see-through things and mirrors are obstacles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from fixation_gym.envs.truth_view import Truth
+from fixation_gym.experiments.scenario_rig import Look, ScenarioRig
+from fixation_gym.experiments.scenario_scenes import Instance
+from fixation_gym.perception.dot_product_rule import dot_product_front
+from fixation_gym.perception.region_vote import VoteSettings, region_votes
+from fixation_gym.types import FloatArray, MaskArray
+
+Rule = Literal["paper", "exact"]
+RULES: tuple[Rule, ...] = ("paper", "exact")
+DEPTH_MARGIN = 0.10
+INNER_PX = 3
+"""Inner pixels are farther than this from depth edges, px of the flow grid: 6 px of the frames that flow is made of."""
+LEAST_REGION_PX = 40
+"""Smaller visible parts of obstacles are not asked about, px of the flow grid."""
+_EDGE = 0.04
+"""Relative jump of depth between neighbours that is an edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class PixelTruth:
+    """True answers on the grid of the flow, shape (h, w)."""
+
+    side: FloatArray
+    """1 nearer, -1 farther, 0 not asked."""
+    inner: MaskArray
+    image: MaskArray
+    """Virtual images of static things that lie clearly behind the fixated object."""
+    image_of_obstacle: MaskArray
+    """Those of obstacles."""
+    regions: dict[int, MaskArray]
+    """Visible pixels of each obstacle, by its index in the scene."""
+
+
+def pixel_truth(rig: ScenarioRig, instance: Instance, truth: Truth, target_depth: float) -> PixelTruth:
+    """Turn depths and geoms into answers."""
+    owners = np.array([*rig.owners, ""])  # index -1: nothing
+    owner, image_owner = owners[truth.geom], owners[truth.image_geom]
+    on_mirror = np.isfinite(truth.image_depth)
+    depth = np.where(on_mirror, truth.image_depth, truth.depth)
+    behind_glass = np.where(on_mirror, truth.image_depth, truth.depth_behind_glass)
+    side = _side(depth, target_depth)
+    side[_side(behind_glass, target_depth) != side] = 0.0
+    excluded = (owner == "target") | (on_mirror & ~_is_thing(image_owner))
+    if instance.mover is not None:
+        moving = rig.sim.obstacles[instance.mover]
+        excluded |= (owner == moving) | (image_owner == moving)
+    side[excluded] = 0.0
+    edges = _edges(depth) | _edges(truth.depth)
+    near_edge = cv2.dilate(edges.astype(np.uint8), np.ones((2 * INNER_PX + 1, 2 * INNER_PX + 1), np.uint8))
+    image = on_mirror & (side < 0.0)
+    return PixelTruth(
+        side=side,
+        inner=near_edge == 0,
+        image=image,
+        image_of_obstacle=image & np.char.startswith(image_owner, "obstacle"),
+        regions={index: owner == body for index, body in enumerate(rig.sim.obstacles)},
+    )
+
+
+def _side(depth: FloatArray, target_depth: float) -> FloatArray:
+    relative = depth / target_depth - 1.0
+    return np.where(np.abs(relative) > DEPTH_MARGIN, -np.sign(relative), 0.0)
+
+
+def _is_thing(owner: np.ndarray) -> MaskArray:
+    """Obstacles, table, room and target: not the robot."""
+    robot = (
+        np.char.startswith(owner, "robot") | np.char.startswith(owner, "gripper") | np.char.startswith(owner, "fixed")
+    )
+    return ~robot & (owner != "")
+
+
+def _edges(depth: FloatArray) -> MaskArray:
+    small = depth.astype(np.float32)
+    kernel = np.ones((3, 3), np.uint8)
+    return np.asarray(cv2.dilate(small, kernel) > (1.0 + 3.0 * _EDGE) * cv2.erode(small, kernel))
+
+
+def answered(look: Look) -> MaskArray:
+    """Pixels that have evidence of their own, shape (h, w): the same for both rules."""
+    return look.percept.zfc.supported & ~look.percept.zfc.outline
+
+
+def calls(look: Look) -> dict[Rule, MaskArray]:
+    """Pixels that each rule calls nearer, shape (h, w); only those that are ``answered`` count."""
+    percept = look.percept
+    with np.errstate(invalid="ignore"):
+        exact = percept.zfc.inverse_depth > percept.zfc.fixated_inverse_depth
+    return {"paper": dot_product_front(percept.flow, look.twist), "exact": exact}
+
+
+def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
+    """Counts per rule; ratios of their sums are the measures."""
+    asked = answered(look) & (truth.side != 0.0)
+    front = truth.side > 0.0
+    result: dict[str, dict[str, int]] = {}
+    for rule, called in calls(look).items():
+        right = called == front
+
+        def count(mask: MaskArray) -> int:
+            return int(np.count_nonzero(mask))
+
+        result[rule] = {
+            "asked": count(asked),
+            "right": count(asked & right),
+            "inner": count(asked & truth.inner),
+            "inner_right": count(asked & truth.inner & right),
+            "front": count(asked & front),
+            "front_called": count(asked & front & called),
+            "called": count(asked & called),
+            "image": count(asked & truth.image),
+            "inner_image": count(asked & truth.image & truth.inner),
+            "inner_image_behind": count(asked & truth.image & truth.inner & ~called),
+            "image_behind": count(asked & truth.image & ~called),
+            "image_of_obstacle": count(asked & truth.image_of_obstacle),
+            "image_of_obstacle_behind": count(asked & truth.image_of_obstacle & ~called),
+            "pixels": count(truth.side != 0.0),
+        }
+    return result
+
+
+def votes(look: Look, region: MaskArray, settings: VoteSettings) -> dict[Rule, tuple[float, float]]:
+    """Votes for front and behind in a region, by each rule; the paper's has neither probability nor own motion."""
+    zfc = look.percept.zfc
+    supported = zfc.supported & region
+    paper = int(np.count_nonzero(supported & calls(look)["paper"]))
+    return {
+        "paper": (float(paper), float(np.count_nonzero(supported) - paper)),
+        "exact": region_votes(zfc, region, settings),
+    }

@@ -1,0 +1,190 @@
+"""From the runs of the scenarios experiment to rows with intervals, table and CSV."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fixation_gym.evaluation.statistics import mean, median, wilson_interval
+from fixation_gym.experiments.scenario_scenes import CLEAR, SCENES, VARIANTS
+
+Run = Mapping[str, Any]
+RULES = ("paper", "exact")
+MEASURES = {
+    "sign_accuracy": ("right", "asked"),
+    "inner_sign_accuracy": ("inner_right", "inner"),
+    "front_recall": ("front_called", "front"),
+    "front_precision": ("front_called", "called"),
+    "image_behind": ("image_behind", "image"),
+    "inner_image_behind": ("inner_image_behind", "inner_image"),
+}
+"""Ratios of pixel counts summed over the instances."""
+FIRST_CALL_S = 0.5
+_RESAMPLES = 1000
+ALL = "all"
+
+OBJECT_GROUPS: dict[str, Callable[[Mapping[str, Any]], bool]] = {
+    "opaque, in front": lambda o: o["kind"] == "opaque" and o["side"] == "front" and not o["moves"],
+    "opaque, behind": lambda o: o["kind"] == "opaque" and o["side"] == "behind" and not o["moves"],
+    "see-through, alpha >= 0.7 or with rim or label": lambda o: (
+        o["kind"] == "translucent" and (o["alpha"] >= 0.7 or o["trimmed"])
+    ),
+    "see-through, 0.5 <= alpha < 0.7, bare": lambda o: (
+        o["kind"] == "translucent" and not o["trimmed"] and 0.5 <= o["alpha"] < 0.7
+    ),
+    "see-through, alpha < 0.5, bare": lambda o: o["kind"] == "translucent" and not o["trimmed"] and o["alpha"] < 0.5,
+    "framed mirror": lambda o: o["kind"] == "mirror",
+    "moves by itself, in front": lambda o: o["moves"] and o["side"] == "front",
+}
+"""Kinds of obstacles that are voted on."""
+
+
+def summarise(runs: Sequence[Run]) -> dict[str, Any]:
+    """Rows per scene, votes per kind of obstacle, and false alarms, JSON-able."""
+    scored = [run for run in runs if run["scene"] != CLEAR]
+    scenes = {}
+    for scene in SCENES:
+        here = [run for run in scored if run["scene"] == scene]
+        scenes[scene] = [
+            _row(variant, [run for run in here if variant in (run["variant"], ALL)], rule)
+            for variant in (*VARIANTS, ALL)
+            for rule in RULES
+        ]
+    objects = [item for run in scored for item in run["objects"]]
+    groups = [
+        _group(name, [item for item in objects if belongs(item)], rule)
+        for name, belongs in OBJECT_GROUPS.items()
+        for rule in RULES
+    ]
+    return {"scenes": scenes, "objects": groups, "clear": _alarms([run for run in runs if run["scene"] == CLEAR])}
+
+
+def _row(variant: str, runs: Sequence[Run], rule: str) -> dict[str, Any]:
+    row: dict[str, Any] = {"variant": variant, "rule": rule, "instances": len(runs)}
+    for name, (part, whole) in MEASURES.items():
+        pairs = [(run["rules"][rule].get(part, 0), run["rules"][rule].get(whole, 0)) for run in runs]
+        row[name], row[f"{name}_ci95"] = bootstrap_ratio(pairs)
+    objects = [item for run in runs for item in run["objects"]]
+    right = [item["final"][rule] == item["side"] for item in objects]
+    row["objects"] = len(objects)
+    row["object_vote_accuracy"] = mean(map(float, right))
+    row["object_vote_ci95"] = list(wilson_interval(sum(right), len(right)))
+    row["unknown_fraction"], row["unknown_ci95"] = bootstrap_ratio([(run["unknown"], run["pixels"]) for run in runs])
+    row["falsely_moving"], _ = bootstrap_ratio([(run["falsely_moving"], run["pixels"]) for run in runs])
+    row["distance_error_median"] = median(run["distance_error"] for run in runs)
+    row["distance_error_worst"] = max((run["distance_error"] for run in runs), default=None)
+    return row
+
+
+def _group(name: str, objects: Sequence[Mapping[str, Any]], rule: str) -> dict[str, Any]:
+    """Votes on one kind of obstacle."""
+    n = len(objects)
+    final = [item["final"][rule] for item in objects]
+    right = sum(item["final"][rule] == item["side"] for item in objects)
+    frames = [_share(item["verdicts"][rule], item["side"]) for item in objects]
+    in_front = [item for item in objects if item["side"] == "front"]
+    calls = [item["first_call_s"][rule] for item in in_front]
+    in_time = sum(call is not None and call <= FIRST_CALL_S for call in calls)
+    return {
+        "group": name,
+        "rule": rule,
+        "objects": n,
+        **{f"called_{side}": final.count(side) for side in ("front", "behind", "unknown")},
+        "vote_accuracy": right / n if n else None,
+        "vote_ci95": list(wilson_interval(right, n)),
+        "frame_vote_accuracy": mean(frames),
+        "first_call_median_s": median(calls) if any(call is not None for call in calls) else None,
+        "first_call_in_time": in_time / len(calls) if calls else None,
+        "first_call_in_time_ci95": list(wilson_interval(in_time, len(calls))),
+    }
+
+
+def _share(verdicts: Mapping[str, int], side: str) -> float:
+    return verdicts.get(side, 0) / max(1, sum(verdicts.values()))
+
+
+def _alarms(runs: Sequence[Run]) -> dict[str, Any]:
+    minutes = sum(run["seconds"] for run in runs) / 60.0
+    totals = {name: sum(run[name] for run in runs) for name in ("map_alarms", "path_alarms")}
+    front, known = (sum(run[name] for run in runs) for name in ("front_cells", "known_cells"))
+    return {
+        "minutes": minutes,
+        **totals,
+        "map_alarms_per_minute": totals["map_alarms"] / minutes if minutes else None,
+        "path_alarms_per_minute": totals["path_alarms"] / minutes if minutes else None,
+        "front_share_of_known_cells": front / known if known else None,
+    }
+
+
+def bootstrap_ratio(pairs: Sequence[tuple[float, float]]) -> tuple[float | None, list[float] | None]:
+    """Ratio of sums with its 95 % interval, drawing whole instances: their pixels are not independent.
+
+    Args:
+        pairs: (part, whole) of every instance.
+    """
+    table = np.array([pair for pair in pairs if pair[1] > 0], dtype=np.float64).reshape(-1, 2)
+    if not len(table):
+        return None, None
+    rng = np.random.default_rng(0)
+    sums = table[rng.integers(0, len(table), (_RESAMPLES, len(table)))].sum(axis=1)
+    low, high = np.quantile(sums[:, 0] / sums[:, 1], (0.025, 0.975))
+    part, whole = table.sum(axis=0)
+    return float(part / whole), [float(low), float(high)]
+
+
+def write_csv(path: Path, scenes: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
+    """Write all rows; an interval becomes two columns."""
+    rows = [{"scene": scene, **_flat(row)} for scene, rows in scenes.items() for row in rows]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(dict.fromkeys(name for row in rows for name in row)))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in row.items():
+        if name.endswith("_ci95"):
+            low, high = value or (None, None)
+            flat |= {f"{name}_low": low, f"{name}_high": high}
+        else:
+            flat[name] = value
+    return flat
+
+
+_COLUMNS = ("sign_accuracy", "inner_sign_accuracy", "front_recall", "front_precision", "inner_image_behind")
+
+
+def format_table(summary: Mapping[str, Any]) -> str:
+    """Plain-text tables: pixels per scene and variant, paper's rule / exact; obstacles; false alarms."""
+    header = (
+        f"{'scene':12}{'variant':10}" + "".join(f"{name:>22}" for name in _COLUMNS) + f"{'votes':>14}{'unknown':>9}"
+    )
+    lines = [f"{header}   (paper / exact)", "-" * len(header)]
+    for scene, rows in summary["scenes"].items():
+        for paper, exact in zip(rows[::2], rows[1::2], strict=True):
+            values = [f"{_number(paper[name])} / {_number(exact[name])}" for name in _COLUMNS]
+            votes = f"{_number(paper['object_vote_accuracy'], 2)} / {_number(exact['object_vote_accuracy'], 2)}"
+            cells = "".join(f"{value:>22}" for value in values)
+            lines.append(f"{scene:12}{exact['variant']:10}{cells}{votes:>14}{_number(exact['unknown_fraction'], 2):>9}")
+    lines.append("")
+    for row in summary["objects"]:
+        if row["rule"] == "exact" and row["objects"]:
+            low, high = row["vote_ci95"]
+            called = ", ".join(f"{row[f'called_{side}']} {side}" for side in ("front", "behind", "unknown"))
+            first = f"in front within {FIRST_CALL_S} s: {_number(row['first_call_in_time'], 2)}"
+            lines.append(f"{row['group']:48}{row['vote_accuracy']:.2f} [{low:.2f}, {high:.2f}]  {called};  {first}")
+    clear = summary["clear"]
+    lines.append(
+        f"\nclear: {clear['minutes']:.1f} min, {clear['map_alarms']} false alarms in the map, "
+        f"{clear['path_alarms']} that change the path"
+    )
+    return "\n".join(lines)
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

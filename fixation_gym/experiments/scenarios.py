@@ -1,0 +1,201 @@
+"""The paper's Fig. 4: what is in front of the fixated object, in four hard scenes, against the truth. Resumable."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fixation_gym.doctor import installed_versions
+from fixation_gym.errors import UsageError, check_names
+from fixation_gym.evaluation import workers
+from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.missing_cells import run_missing
+from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders, write_json
+from fixation_gym.experiments.scenario_scenes import CLEAR, SCENES, VARIANTS
+from fixation_gym.experiments.scenario_statistics import summarise, write_csv
+
+if TYPE_CHECKING:
+    from fixation_gym.experiments.scenario_rig import ScenarioRig
+
+RUNS_FILE, CSV_FILE, FIGURE_FILE = "runs.jsonl", "rows.csv", "scenarios.png"
+
+Cell = dict[str, Any]
+Key = tuple[str, str, int]
+"""(scene, variant, seed)"""
+
+
+def video_file(scene: str) -> str:
+    """Name of the video of a scene."""
+    return f"{scene}.mp4"
+
+
+@dataclass(frozen=True)
+class ScenariosConfig:
+    """What to look at, and with how many processes."""
+
+    quick: bool = False
+    """Three instances instead of twenty."""
+    instances: int | None = None
+    """Random instances of every scene and variant, and of the clear scene; None for 20, or 3 if quick."""
+    seed: int = 0
+    noise: str = "nominal"
+    workers: int = 1
+    film: bool = True
+    """Whether to make figure and videos."""
+
+    def check(self) -> None:
+        """Check everything that can be checked without the simulator.
+
+        Raises:
+            UsageError: naming the first bad value and what is allowed.
+        """
+        from fixation_gym.envs.config import SENSOR_NOISE
+
+        check_names([self.noise], SENSOR_NOISE, "sensor noise")
+        if self.seed < 0:
+            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
+        if not 1 <= self.instance_count <= SEED_BLOCK:
+            raise UsageError(f"--instances must be within 1..{SEED_BLOCK}, got {self.instances}")
+        workers.check_backend("loky", self.workers)
+
+    @property
+    def instance_count(self) -> int:
+        """Random instances of every scene and variant."""
+        return self.instances if self.instances is not None else 3 if self.quick else 20
+
+    def run_description(self) -> dict[str, Any]:
+        """Everything the result of one run depends on, apart from its key."""
+        return {
+            "command": "scenarios",
+            "seed": self.seed,
+            "noise": self.noise,
+            "gl": os.environ.get("MUJOCO_GL"),
+            "versions": installed_versions(),
+        }
+
+    def cells(self) -> dict[Key, Cell]:
+        """All runs. A seed's scenes come before those of the next, so that part of a run shows the whole."""
+        cells = {}
+        for index in range(self.instance_count):
+            seed = self.seed * SEED_BLOCK + index
+            keys = [(scene, variant, seed) for scene in SCENES for variant in VARIANTS]
+            keys.append((CLEAR, VARIANTS[index % 2], seed))  # lateral and approaching in turn
+            for scene, variant, seed in keys:
+                cells[scene, variant, seed] = {"scene": scene, "variant": variant, "seed": seed, "noise": self.noise}
+        return cells
+
+
+def cell_key(cell: Cell) -> Key:
+    """What tells the results of one run apart."""
+    return cell["scene"], cell["variant"], cell["seed"]
+
+
+def instance_rng(cell: Cell) -> np.random.Generator:
+    """The generator of an instance and of its noise."""
+    scene = (*SCENES, CLEAR).index(cell["scene"])
+    return np.random.default_rng([cell["seed"], scene, VARIANTS.index(cell["variant"]), 4])
+
+
+_rigs: dict[str, ScenarioRig] = {}  # at most one: it is large
+
+
+def rig_for(noise: str) -> ScenarioRig:
+    """The rig of this process with some sensor noise."""
+    from fixation_gym.gl import select_backend
+
+    select_backend()
+    import cv2
+
+    from fixation_gym.envs.config import SENSOR_NOISE
+    from fixation_gym.experiments.scenario_rig import ScenarioRig
+
+    cv2.setNumThreads(1)  # images are small: threads cost more than they gain
+    if noise not in _rigs:
+        close_rigs()
+        _rigs[noise] = ScenarioRig(SENSOR_NOISE[noise])
+    return _rigs[noise]
+
+
+def run_cell(cell: Cell) -> dict[str, Any]:
+    """Look at the instance of a cell; returns the cell with its scores."""
+    rig = rig_for(cell["noise"])
+    from fixation_gym.experiments.scenario_runs import run_clear, run_scene
+
+    rng = instance_rng(cell)
+    if cell["scene"] == CLEAR:
+        return {**cell, **run_clear(rig, cell["variant"], rng)}
+    return {**cell, **run_scene(rig, cell["scene"], cell["variant"], rng)}
+
+
+@atexit.register
+def close_rigs() -> None:
+    """Close the rig that ``run_cell`` keeps alive in this process."""
+    while _rigs:
+        _rigs.popitem()[1].close()
+
+
+def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
+    """Make the runs that a folder does not have yet, and write summary, CSV, figure and videos.
+
+    Args:
+        config: must have passed ``check``.
+        out: folder; made if needed.
+        run: runs one cell; tests replace it.
+
+    Returns:
+        The summary, as in ``summary.json``.
+
+    Raises:
+        UsageError: if the folder cannot be used.
+    """
+    started = time.monotonic()
+    cells = config.cells()
+    store: ResultStore[Key, dict[str, Any]] = ResultStore(
+        out, config.run_description(), RUNS_FILE, key=cell_key, from_json=_checked, to_json=dict
+    )
+    with store:
+        check_no_folders(out, (CSV_FILE, FIGURE_FILE, *map(video_file, SCENES)))
+        resumed = run_missing(
+            store,
+            cells,
+            run,
+            parse=dict,
+            note=lambda value: f"{value['scene']}, {value['variant']}",
+            unit="run",
+            processes=config.workers,
+        )
+        summary = {
+            **summarise([store.finished[key] for key in cells]),
+            **config.run_description(),
+            "quick": config.quick,
+            "instances": config.instance_count,
+            "runs_resumed": resumed,
+            "wall_s": time.monotonic() - started,
+        }
+        write_json(out / SUMMARY_FILE, summary)
+        write_csv(out / CSV_FILE, summary["scenes"])
+        if config.film:
+            from fixation_gym.experiments.scenario_pictures import film
+
+            examples = {scene: cells[scene, VARIANTS[0], config.seed * SEED_BLOCK] for scene in SCENES}
+            film(rig_for(config.noise), {scene: instance_rng(cell) for scene, cell in examples.items()}, out)
+        close_rigs()
+    return summary
+
+
+def _checked(value: Any) -> dict[str, Any]:
+    """A stored run.
+
+    Raises:
+        ValueError: if something of it is missing.
+    """
+    if not isinstance(value, dict) or not {"scene", "variant", "seed", "frames"} <= set(value):
+        raise ValueError("not a run")
+    return value

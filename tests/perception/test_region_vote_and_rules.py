@@ -1,0 +1,95 @@
+"""The paper's dot product rule, votes of regions, and the check of the distance by the target's own motion."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_pipeline_and_zero_flow import CAMERA, POSTERS, TARGET, on_grid, run
+
+from fixation_gym.geometry.interaction import fixation_coupling, image_flow
+from fixation_gym.geometry.twist import mean_twist
+from fixation_gym.perception.dot_product_rule import dot_product_front
+from fixation_gym.perception.region_vote import Side, VoteSettings, decide, region_votes
+from fixation_gym.perception.target_motion import checked_inverse_depth, target_inverse_depth
+
+
+@pytest.mark.parametrize("v_z", [0.0, 0.05])
+@pytest.mark.parametrize("x", [-0.5, -0.3, 0.0, 0.3, 0.5])
+def test_the_papers_rule_changes_sides_on_the_circle_and_not_on_the_plane(x, v_z):
+    v, fixated = np.array([0.1, 0.0, v_z]), 0.5
+    twist = np.array([*v, *fixation_coupling(v, 1 / fixated), 0.0])
+    switch = fixated * (1 - x * v_z / v[0]) / (1 + x**2)  # theory of Raviv's circle, tilted by the heading
+    for factor, front in ((0.98, True), (1.02, False)):
+        flow = np.stack(image_flow(np.full((1, 1), x), np.zeros((1, 1)), 1 / (factor * switch), twist), -1)
+        assert dot_product_front(SimpleNamespace(flow=flow), v)[0, 0] == front  # pyright: ignore
+
+
+def test_the_papers_rule_says_nothing_without_flow():
+    flow = SimpleNamespace(flow=np.full((2, 2, 2), np.nan))
+    assert not dot_product_front(flow, np.array([0.1, 0.0, 0.0])).any()  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("front", "behind", "side"),
+    [
+        (0, 0, Side.UNKNOWN),
+        (5, 0, Side.UNKNOWN),
+        (20, 0, Side.FRONT),
+        (20, 100, Side.FRONT),  # a rim around what is seen through
+        (8, 100, Side.UNKNOWN),
+        (2, 100, Side.BEHIND),
+        (0, 5, Side.UNKNOWN),
+    ],
+)
+def test_a_small_solid_share_in_front_decides(front, behind, side):
+    assert decide(front, behind, VoteSettings()) is side
+
+
+def test_regions_of_the_poster_scene_are_voted_right():
+    _, percept, _, (_, index, _) = run(POSTERS, 18)
+    sides = {2: Side.FRONT, 3: Side.FRONT, 4: Side.BEHIND, 5: Side.BEHIND}
+    for number, side in sides.items():
+        votes = region_votes(percept.zfc, on_grid(index == number, percept) > 0, VoteSettings())
+        assert decide(*votes, VoteSettings()) is side
+
+
+def test_outlines_next_to_something_behind_are_marked_and_lie_at_depth_edges():
+    _, percept, _, (depth, _, pose) = run(POSTERS, 18)
+    fixated = pose[:3, 2] @ (TARGET - pose[:3, 3])
+    zfc = percept.zfc
+    assert 0.01 < zfc.outline.mean() < 0.2
+    wrong = zfc.supported & (zfc.inverse_depth > zfc.fixated_inverse_depth) & (on_grid(depth, percept) > 1.1 * fixated)
+    assert (wrong & zfc.outline).sum() > 0.7 * wrong.sum()
+
+
+def test_the_target_says_its_distance_by_its_own_motion():
+    perception, percept, _, (_, index, pose) = run(POSTERS, 18)
+    first, _, last = perception._frames
+    twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
+    found = target_inverse_depth(percept.flow, twist, on_grid(index == 1, percept) > 0)
+    assert found is not None
+    value, std = found
+    true = 1 / (pose[:3, 2] @ (TARGET - pose[:3, 3]))
+    assert value == pytest.approx(true, rel=0.06)
+    assert abs(value - true) < 3 * std
+    assert target_inverse_depth(percept.flow, twist, np.zeros(index.shape, bool)[:80, :107]) is None
+
+
+def test_the_distance_from_the_centroid_holds_unless_the_motion_contradicts_it():
+    assert checked_inverse_depth((2.0, 0.02), []) == (2.0, 0.02)
+    assert checked_inverse_depth((2.0, 0.02), [(2.05, 0.05)] * 5) == (2.0, 0.02)
+    assert checked_inverse_depth((3.0, 0.02), [(2.0, 0.05)] * 5) == (2.0, 0.05)
+    assert checked_inverse_depth((3.0, 0.02), [(2.0, 0.05)] * 2) == (3.0, 0.02)
+    assert checked_inverse_depth((3.0, 0.02), [(2.0, 2.0)] * 5) == (3.0, 0.02)
+
+
+def test_with_the_focus_of_expansion_inside_the_image_its_surroundings_are_unknown_and_nothing_breaks():
+    from test_pipeline_and_zero_flow import fixating_pose, frames, poster_scene
+
+    _, percept, _, _ = run(frames(poster_scene(), lambda t: fixating_pose([0.1 * t, 0.0, 0.0], TARGET)), 8)
+    grid = percept.flow.intrinsics
+    x, y = grid.grid
+    focus = np.hypot(x, y) < 0.06
+    assert not percept.zfc.supported[focus].any()
+    assert np.isfinite(percept.zfc.p_nearer).all()
+    assert CAMERA.width == 2 * grid.width
