@@ -126,13 +126,13 @@ class Distance:
 
     def run(self) -> int:
         """Measure and print the table."""
-        from fixation_gym.experiments.distance import CSV_FILE, FIGURE_FILE, DistanceConfig, measure
+        from fixation_gym.experiments.distance.run import CSV_FILE, FIGURE_FILE, DistanceConfig, measure
 
         config = DistanceConfig(self.quick, self.seeds, self.seed, self.noise, self.workers)
         config.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_gym.experiments.distance_statistics import format_table
+        from fixation_gym.experiments.distance.statistics import format_table
 
         summary = measure(config, self.out)
         print(format_table(summary))
@@ -161,17 +161,16 @@ class Scenarios:
 
     def run(self) -> int:
         """Look and print the table."""
-        from fixation_gym.experiments.scenario_scenes import SCENES
-        from fixation_gym.experiments.scenarios import CSV_FILE, FIGURE_FILE, ScenariosConfig, measure, video_file
+        from fixation_gym.experiments.scenarios.run import CSV_FILE, FIGURE_FILE, VIDEO_FILES, ScenariosConfig, measure
 
         config = ScenariosConfig(self.quick, self.instances, self.seed, self.noise, self.workers, self.film)
         config.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_gym.experiments.scenario_statistics import format_table
+        from fixation_gym.experiments.scenarios.statistics import format_table
 
         print(format_table(measure(config, self.out)))
-        pictures = (FIGURE_FILE, *map(video_file, SCENES)) if self.film else ()
+        pictures = (FIGURE_FILE, *VIDEO_FILES.values()) if self.film else ()
         print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, *pictures)))
         return 0
 
@@ -191,7 +190,7 @@ class Bench:
         from fixation_gym.evaluation.storage import make_folder
 
         make_folder(self.out)
-        from fixation_gym.experiments.bench import FIGURE_FILE, bench, format_table
+        from fixation_gym.experiments.bench.run import FIGURE_FILE, bench, format_table
 
         print(format_table(bench(self.quick, self.out)))
         print(f"\n{self.out / FIGURE_FILE}")

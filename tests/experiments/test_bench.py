@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from fixation_gym.experiments import bench, bench_groups
-from fixation_gym.experiments.bench_figure import draw_figure
-from fixation_gym.experiments.bench_groups import Case, LocalGroup
+from fixation_gym.experiments.bench import groups as bench_groups
+from fixation_gym.experiments.bench import run as bench
+from fixation_gym.experiments.bench.figure import draw_figure
+from fixation_gym.experiments.bench.groups import Case, LocalGroup
 
 
 def test_cases_of_all_groups_are_interleaved_and_every_call_is_timed(monkeypatch):

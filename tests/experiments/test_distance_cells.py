@@ -12,8 +12,10 @@ import pytest
 
 from fixation_gym import cli
 from fixation_gym.errors import UsageError
-from fixation_gym.experiments import distance, distance_figure
-from fixation_gym.experiments.distance import (
+from fixation_gym.experiments.distance import figure as distance_figure
+from fixation_gym.experiments.distance import run as distance
+from fixation_gym.experiments.distance.duck_print import WIDTHS, card_image, duck_mask, valid_widths
+from fixation_gym.experiments.distance.run import (
     CSV_FILE,
     DISTANCES,
     FIGURE_FILE,
@@ -22,15 +24,14 @@ from fixation_gym.experiments.distance import (
     cell_key,
     measure,
 )
-from fixation_gym.experiments.distance_statistics import (
+from fixation_gym.experiments.distance.sequence import HOME, INTRINSICS, JUMP_M, Circle, Condition
+from fixation_gym.experiments.distance.statistics import (
     errors_of,
     format_table,
     motion_ratios,
     nees_bounds,
     summary_rows,
 )
-from fixation_gym.experiments.duck_print import WIDTHS, card_image, duck_mask, valid_widths
-from fixation_gym.experiments.sequence import HOME, INTRINSICS, JUMP_M, Circle, Condition
 
 SAMPLES = 225
 

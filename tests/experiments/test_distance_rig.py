@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.envs.config import SENSOR_NOISE
-from fixation_gym.experiments.sequence import CENTROID_STD_PX, HOME, INTRINSICS, Condition
+from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, HOME, INTRINSICS, Condition
 from fixation_gym.geometry.rigid import inverse, look_at, transform
 from fixation_gym.perception.flat_target import coverage, flat_centroid
 from fixation_gym.perception.segmentation import segment
@@ -23,7 +23,7 @@ def rig() -> Iterator:
     from fixation_gym.gl import select_backend
 
     select_backend()
-    from fixation_gym.experiments.distance_rig import PrintRig
+    from fixation_gym.experiments.distance.rig import PrintRig
 
     rig = PrintRig()
     yield rig
@@ -62,7 +62,7 @@ def test_the_background_fills_the_image_and_is_not_red(rig) -> None:
 
 @pytest.mark.parametrize("motion", ["fixation", "translation"])
 def test_a_short_recording_gives_the_distance(rig, motion, monkeypatch: pytest.MonkeyPatch) -> None:
-    from fixation_gym.experiments import estimates, recording, sequence
+    from fixation_gym.experiments.distance import estimates, recording, sequence
 
     for module in (recording, sequence):
         monkeypatch.setattr(module, "MEASURE_S", 1.0)
@@ -97,7 +97,7 @@ def test_a_short_recording_gives_the_distance(rig, motion, monkeypatch: pytest.M
 
 
 def test_the_same_seed_gives_the_same_recording(rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    from fixation_gym.experiments import recording
+    from fixation_gym.experiments.distance import recording
 
     monkeypatch.setattr(recording, "BURN_IN_S", 0.2)
     monkeypatch.setattr(recording, "MEASURE_S", 0.2)

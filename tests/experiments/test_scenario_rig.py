@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.envs.config import SENSOR_NOISE
-from fixation_gym.experiments.scenario_scenes import SCENES
+from fixation_gym.experiments.scenarios.scenes import SCENES
 
 pytestmark = pytest.mark.sim
 
@@ -19,7 +19,7 @@ def rig() -> Iterator:
     from fixation_gym.gl import select_backend
 
     select_backend()
-    from fixation_gym.experiments.scenario_rig import ScenarioRig
+    from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
     rig = ScenarioRig(SENSOR_NOISE["ideal"])
     yield rig
@@ -33,7 +33,7 @@ def looks(rig, scene, variant="lateral", seed=3, seconds=1.2):
 
 
 def test_true_depths_are_those_of_the_estimated_flow_also_in_a_mirror(rig) -> None:
-    from fixation_gym.experiments.scenario_scores import pixel_truth
+    from fixation_gym.experiments.scenarios.scores import pixel_truth
 
     instance, seen = looks(rig, "reflection")
     look = seen[-1]
@@ -73,7 +73,7 @@ def test_a_moving_obstacle_moves_as_told(rig) -> None:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_run_is_scored_and_the_exact_rule_is_right(rig, scene, monkeypatch) -> None:
-    from fixation_gym.experiments import scenario_runs
+    from fixation_gym.experiments.scenarios import scoring_run as scenario_runs
 
     draw = rig.draw
     monkeypatch.setattr(rig, "draw", lambda *given: replace(draw(*given), duration_s=1.0))
@@ -93,8 +93,8 @@ def test_two_runs_with_the_same_seed_agree(rig) -> None:
 
 
 def test_pictures_of_a_look_are_all_of_one_size(rig) -> None:
-    from fixation_gym.experiments.scenario_pictures import ROWS, panels
-    from fixation_gym.experiments.scenario_scores import pixel_truth
+    from fixation_gym.experiments.scenarios.pictures import ROWS, panels
+    from fixation_gym.experiments.scenarios.scores import pixel_truth
 
     instance, seen = looks(rig, "mirror", seconds=0.3)
     pictures = panels(seen[-1], pixel_truth(rig, instance, rig.truth(seen[-1]), seen[-1].target_depth))

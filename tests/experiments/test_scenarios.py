@@ -11,7 +11,8 @@ import pytest
 
 from fixation_gym import cli
 from fixation_gym.errors import UsageError
-from fixation_gym.experiments.scenario_scenes import (
+from fixation_gym.experiments.scenarios.run import CSV_FILE, RUNS_FILE, ScenariosConfig, cell_key, instance_rng, measure
+from fixation_gym.experiments.scenarios.scenes import (
     CIRCLE_RADIUS,
     CIRCLE_RATE,
     CLEAR,
@@ -20,9 +21,8 @@ from fixation_gym.experiments.scenario_scenes import (
     Instance,
     sample_instance,
 )
-from fixation_gym.experiments.scenario_statistics import bootstrap_ratio, format_table
-from fixation_gym.experiments.scenario_view import MARGIN, SceneView
-from fixation_gym.experiments.scenarios import CSV_FILE, RUNS_FILE, ScenariosConfig, cell_key, instance_rng, measure
+from fixation_gym.experiments.scenarios.statistics import bootstrap_ratio, format_table
+from fixation_gym.experiments.scenarios.view import MARGIN, SceneView
 from fixation_gym.geometry.rigid import inverse, look_at, transform
 
 

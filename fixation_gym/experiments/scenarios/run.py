@@ -18,22 +18,18 @@ from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders, write_json
-from fixation_gym.experiments.scenario_scenes import CLEAR, SCENES, VARIANTS
-from fixation_gym.experiments.scenario_statistics import summarise, write_csv
+from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
+from fixation_gym.experiments.scenarios.statistics import summarise, write_csv
 
 if TYPE_CHECKING:
-    from fixation_gym.experiments.scenario_rig import ScenarioRig
+    from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
 RUNS_FILE, CSV_FILE, FIGURE_FILE = "runs.jsonl", "rows.csv", "scenarios.png"
+VIDEO_FILES = {scene: f"{scene}.mp4" for scene in SCENES}
 
 Cell = dict[str, Any]
 Key = tuple[str, str, int]
 """(scene, variant, seed)"""
-
-
-def video_file(scene: str) -> str:
-    """Name of the video of a scene."""
-    return f"{scene}.mp4"
 
 
 @dataclass(frozen=True)
@@ -114,7 +110,7 @@ def rig_for(noise: str) -> ScenarioRig:
     import cv2
 
     from fixation_gym.envs.config import SENSOR_NOISE
-    from fixation_gym.experiments.scenario_rig import ScenarioRig
+    from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
     cv2.setNumThreads(1)  # images are small: threads cost more than they gain
     if noise not in _rigs:
@@ -126,7 +122,7 @@ def rig_for(noise: str) -> ScenarioRig:
 def run_cell(cell: Cell) -> dict[str, Any]:
     """Look at the instance of a cell; returns the cell with its scores."""
     rig = rig_for(cell["noise"])
-    from fixation_gym.experiments.scenario_runs import run_clear, run_scene
+    from fixation_gym.experiments.scenarios.scoring_run import run_clear, run_scene
 
     rng = instance_rng(cell)
     if cell["scene"] == CLEAR:
@@ -161,7 +157,7 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
         out, config.run_description(), RUNS_FILE, key=cell_key, from_json=_checked, to_json=dict
     )
     with store:
-        check_no_folders(out, (CSV_FILE, FIGURE_FILE, *map(video_file, SCENES)))
+        check_no_folders(out, (CSV_FILE, FIGURE_FILE, *VIDEO_FILES.values()))
         resumed = run_missing(
             store,
             cells,
@@ -182,10 +178,12 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
         write_json(out / SUMMARY_FILE, summary)
         write_csv(out / CSV_FILE, summary["scenes"])
         if config.film:
-            from fixation_gym.experiments.scenario_pictures import film
+            from fixation_gym.experiments.scenarios.pictures import film
 
             examples = {scene: cells[scene, VARIANTS[0], config.seed * SEED_BLOCK] for scene in SCENES}
-            film(rig_for(config.noise), {scene: instance_rng(cell) for scene, cell in examples.items()}, out)
+            videos = {scene: out / name for scene, name in VIDEO_FILES.items()}
+            generators = {scene: instance_rng(cell) for scene, cell in examples.items()}
+            film(rig_for(config.noise), generators, videos, out / FIGURE_FILE)
         close_rigs()
     return summary
 

@@ -17,7 +17,7 @@ from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
 from fixation_gym.envs.scene_mjcf import CAMERA_NAME, HIDDEN_GROUP, part_name
 from fixation_gym.envs.truth_view import Truth, TruthView
-from fixation_gym.experiments.scenario_scenes import Instance, sample_instance
+from fixation_gym.experiments.scenarios.scenes import Instance, sample_instance
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose, pose_to_matrix
 from fixation_gym.perception import Percept, Perception, segment

@@ -18,12 +18,12 @@ from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders, write_json
-from fixation_gym.experiments.distance_statistics import summarise, write_csv
-from fixation_gym.experiments.duck_print import valid_widths
-from fixation_gym.experiments.sequence import INTRINSICS, Condition, Motion
+from fixation_gym.experiments.distance.duck_print import valid_widths
+from fixation_gym.experiments.distance.sequence import INTRINSICS, Condition, Motion
+from fixation_gym.experiments.distance.statistics import summarise, write_csv
 
 if TYPE_CHECKING:
-    from fixation_gym.experiments.distance_rig import PrintRig
+    from fixation_gym.experiments.distance.rig import PrintRig
 
 DISTANCES = (0.066, 0.097, 0.15, 0.21, 0.31, 0.45, 0.66, 0.97, 1.4, 2.0, 3.1, 4.5, 6.6)
 """m, evenly spaced in the logarithm but for the paper's 0.15 and 2."""
@@ -121,10 +121,10 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     import cv2
 
     from fixation_gym.envs.config import SENSOR_NOISE
-    from fixation_gym.experiments.distance_rig import PrintRig
-    from fixation_gym.experiments.estimates import assess, bounds, estimators, run
-    from fixation_gym.experiments.recording import record
-    from fixation_gym.experiments.sequence import CENTROID_STD_PX
+    from fixation_gym.experiments.distance.estimates import assess, bounds, estimators, run
+    from fixation_gym.experiments.distance.recording import record
+    from fixation_gym.experiments.distance.rig import PrintRig
+    from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX
 
     cv2.setNumThreads(1)  # images are small: threads cost more than they gain
     if not _rigs:
@@ -179,7 +179,7 @@ def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, A
     Raises:
         UsageError: if the folder cannot be used.
     """
-    from fixation_gym.experiments.distance_figure import draw_figure
+    from fixation_gym.experiments.distance.figure import draw_figure
 
     started = time.monotonic()
     cells = config.cells()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fixation_gym.experiments.distance_statistics import PAPER
+from fixation_gym.experiments.distance.statistics import PAPER
 
 _ROBOT, _LENS = "mae_median_m", "mae_median_lens_m"
 _LINES = (

@@ -15,8 +15,8 @@ import fixation_gym  # noqa: F401 - registers the environments
 from fixation_gym.envs.config import CONTROL_FREQUENCY
 from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.envs.zfc_observation import OBSERVATIONS
-from fixation_gym.experiments.bench_groups import Case
-from fixation_gym.experiments.bench_stages import stages
+from fixation_gym.experiments.bench.groups import Case
+from fixation_gym.experiments.bench.stages import stages
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import CAMERA_FOVY

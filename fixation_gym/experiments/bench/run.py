@@ -18,10 +18,10 @@ from tqdm import tqdm
 
 from fixation_gym.doctor import installed_versions
 from fixation_gym.evaluation.storage import SUMMARY_FILE, folder_lock, make_folder, write_json
-from fixation_gym.experiments.bench_cases import all_groups
-from fixation_gym.experiments.bench_figure import draw_figure
-from fixation_gym.experiments.bench_groups import Group, ProcessGroup
-from fixation_gym.experiments.bench_processes import lift_reset_rows, memory_slope_kib, steps_per_second
+from fixation_gym.experiments.bench.cases import all_groups
+from fixation_gym.experiments.bench.figure import draw_figure
+from fixation_gym.experiments.bench.groups import Group, ProcessGroup
+from fixation_gym.experiments.bench.processes import lift_reset_rows, memory_slope_kib, steps_per_second
 
 FIGURE_FILE = "bench.png"
 _ROUND_S = 0.12

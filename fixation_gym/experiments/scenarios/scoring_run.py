@@ -11,9 +11,9 @@ import numpy as np
 from fixation_gym.control.obstacle_term import obstacle_term
 from fixation_gym.envs.object_pool import obstacle_shape
 from fixation_gym.envs.scene import ObstacleSpec
-from fixation_gym.experiments.scenario_rig import Look, ScenarioRig
-from fixation_gym.experiments.scenario_scenes import CLEAR, Instance
-from fixation_gym.experiments.scenario_scores import (
+from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
+from fixation_gym.experiments.scenarios.scenes import CLEAR, Instance
+from fixation_gym.experiments.scenarios.scores import (
     DEPTH_MARGIN,
     LEAST_REGION_PX,
     RULES,

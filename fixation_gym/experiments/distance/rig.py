@@ -15,8 +15,8 @@ from fixation_gym.envs import scene_mjcf
 from fixation_gym.envs.pick_sim import ArmState, PickSim
 from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import SceneSpec, TargetSpec
-from fixation_gym.experiments.duck_print import CARD_PER_WIDTH, TEXTURE_SIZE, card_image
-from fixation_gym.experiments.sequence import HOME, IMAGE_SIZE
+from fixation_gym.experiments.distance.duck_print import CARD_PER_WIDTH, TEXTURE_SIZE, card_image
+from fixation_gym.experiments.distance.sequence import HOME, IMAGE_SIZE
 from fixation_gym.types import FloatArray, ImageArray
 
 CONTROL_FREQUENCY = 25

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.envs.config import SensorNoise
-from fixation_gym.experiments.recording import Frame, Recording, filter_settings, pose_estimate
-from fixation_gym.experiments.sequence import CENTROID_STD_PX, CYCLE_RATE, INTRINSICS
+from fixation_gym.experiments.distance.recording import Frame, Recording, filter_settings, pose_estimate
+from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, CYCLE_RATE, INTRINSICS
 from fixation_gym.geometry.twist import skew
 from fixation_gym.perception import calibrating_filter, distance_filters, flow_distance_filters
 from fixation_gym.perception.distance_filters import DistanceSettings

@@ -10,9 +10,8 @@ import numpy as np
 
 from fixation_gym.envs.config import CONTROL_FREQUENCY
 from fixation_gym.evaluation.video import VideoWriter, caption
-from fixation_gym.experiments.scenario_rig import Look, ScenarioRig
-from fixation_gym.experiments.scenario_scores import PixelTruth, answered, calls, pixel_truth
-from fixation_gym.experiments.scenarios import FIGURE_FILE, video_file
+from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
+from fixation_gym.experiments.scenarios.scores import PixelTruth, answered, calls, pixel_truth
 from fixation_gym.perception import draw_overlay
 from fixation_gym.perception.drawing import BEHIND_RGB, FRONT_RGB, MOVING_RGB
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
@@ -31,16 +30,19 @@ _FASTEST = 25.0
 """Image speed that is drawn in full colour, px of the flow grid per s."""
 
 
-def film(rig: ScenarioRig, examples: Mapping[str, np.random.Generator], out: Path) -> None:
+def film(
+    rig: ScenarioRig, examples: Mapping[str, np.random.Generator], videos: Mapping[str, Path], figure: Path
+) -> None:
     """Write a video of a lateral instance of every scene, and the figure.
 
     Args:
         rig: to look with.
         examples: generator of the instance, by scene.
-        out: folder.
+        videos: file of the video, by scene.
+        figure: file of the figure.
     """
-    columns = {scene: _film_scene(rig, scene, rng, out / video_file(scene)) for scene, rng in examples.items()}
-    draw_figure(out / FIGURE_FILE, columns)
+    columns = {scene: _film_scene(rig, scene, rng, videos[scene]) for scene, rng in examples.items()}
+    draw_figure(figure, columns)
 
 
 def _film_scene(rig: ScenarioRig, scene: str, rng: np.random.Generator, path: Path) -> list[ImageArray]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, obstacle_shape
 from fixation_gym.envs.scene import ObstacleSpec, SceneSpec
-from fixation_gym.experiments.scenario_view import MARGIN, SceneView, sample_view
+from fixation_gym.experiments.scenarios.view import MARGIN, SceneView, sample_view
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.types import FloatArray
 

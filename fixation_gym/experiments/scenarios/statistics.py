@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.evaluation.statistics import mean, median, wilson_interval
-from fixation_gym.experiments.scenario_scenes import CLEAR, SCENES, VARIANTS
+from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
 
 Run = Mapping[str, Any]
 RULES = ("paper", "exact")

@@ -1,0 +1,1 @@
+"""Times of every stage and of comparable environments."""

@@ -1,0 +1,1 @@
+"""The paper's Fig. 3b: error of the distance against distance."""
