@@ -6,7 +6,9 @@ it can be wrong by half with a small stated error. The motion of the target's ow
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from statistics import median
 
 import cv2
 import numpy as np
@@ -45,7 +47,8 @@ def target_inverse_depth(flow: Flow, twist: FloatArray, target: MaskArray) -> In
     information = gx * gx * xx + 2.0 * gx * gy * xy + gy * gy * yy
     bx, by = flow.gradient[:, rows, columns].astype(np.float64)
     depth = flow.warp_inverse_depth - (gx * bx + gy * by) / np.maximum(information, 1e-12)
-    weight = np.minimum(information, np.quantile(information, 0.9))  # no single edge decides
+    ninth = int(0.9 * (len(information) - 1))
+    weight = np.minimum(information, np.partition(information, ninth)[ninth])  # no single edge decides
     order = np.argsort(depth)
     share = np.cumsum(weight[order])
     if not share[-1] > 0.0:
@@ -64,7 +67,6 @@ def checked_inverse_depth(believed: InverseDepth, recent: Sequence[InverseDepth]
     """
     if len(recent) < 3:
         return believed
-    values, stds = np.array(recent).T
-    value, std = float(np.median(values)), float(np.median(stds))
-    contradicts = abs(value - believed[0]) > _GATE * float(np.hypot(std, believed[1]))
+    value, std = (median(part) for part in zip(*recent, strict=True))
+    contradicts = abs(value - believed[0]) > _GATE * math.hypot(std, believed[1])
     return (value, std) if contradicts and value > 0.0 else believed
