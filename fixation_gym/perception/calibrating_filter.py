@@ -244,15 +244,19 @@ def _update(state: CalibratingState, sighting: Sighting, settings: CalibratingSe
 
 
 def _restart(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
-    """Begin anew where the target is seen now; what was learnt about the calibration stays."""
+    """Begin anew where the target is seen now; what was learnt about the calibration stays.
+
+    So does the distance, unless it was hardly known. Noise of the first, nearly resting frames can put it far off; as a
+    prior it would keep every following start from the truth, so that one begins with the first guess.
+    """
     before = distance_at(state, sighting)
     fresh = _first(sighting, settings)
-    rho = 1.0 / before.robot
     mean, cov = fresh.mean.copy(), fresh.cov.copy()
-    mean[2], mean[3:] = rho, state.mean[3:]
-    spread = float(np.hypot(before.robot_std, settings.jump_std_m))
-    cov[2, 2] = min(spread * rho**2, settings.initial_relative_std * rho) ** 2
-    cov[3:, 3:] = state.cov[3:, 3:]
+    if before.robot_std < _KNOWN_RELATIVE_STD * before.robot:
+        mean[2] = rho = 1.0 / before.robot
+        spread = float(np.hypot(before.robot_std, settings.jump_std_m))
+        cov[2, 2] = min(spread * rho**2, settings.initial_relative_std * rho) ** 2
+    mean[3:], cov[3:, 3:] = state.mean[3:], state.cov[3:, 3:]
     fresh = replace(fresh, mean=mean, cov=cov, prior_mean=mean, prior_cov=cov)
     return _update(fresh, sighting, settings)
 
@@ -285,6 +289,8 @@ MIN_INVERSE_DEPTH = 1e-3
 """Targets farther than 1 km are put there, 1/m."""
 MIN_DEPTH_M = 0.01
 """Targets nearer than this, or behind the camera, are reported at this depth, m."""
+_KNOWN_RELATIVE_STD = 0.3
+"""A distance that is stated less surely than this is no prior for a new start."""
 _EXACT = 1e-9
 """Prior of a calibration value that is taken to be exact."""
 _ROW = 57

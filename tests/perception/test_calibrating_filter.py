@@ -184,3 +184,19 @@ def test_a_target_behind_the_camera_has_a_finite_positive_distance():
     now = distance_at(state, beyond)
     assert now.robot > 0.0
     assert np.isfinite([now.robot, now.robot_std, now.lens, now.lens_std]).all()
+
+
+def test_a_distance_that_was_never_known_does_not_bind_the_next_start():
+    # Noise of frames almost at rest may say "far, give or take", many of those deviations from the truth.
+    rng, settings = np.random.default_rng(0), replace(SETTINGS, initial_distance_m=0.09, centroid_std_size=0.0)
+    _, sighting = sight(0.0, 0.066, 0.02, rng)
+    state = advance(None, sighting, DT, settings)
+    far = state.mean.copy()
+    far[2] = 1.0
+    cov = state.cov.copy()
+    cov[2, 2] = 0.6**2
+    state = replace(state, mean=far, cov=cov, prior_mean=far, prior_cov=cov)
+    for k in range(1, 26):
+        pose, sighting = sight(k * DT, 0.066, 0.02, rng, fixating=False)
+        state = advance(state, sighting, DT, settings)
+    assert distance_at(state, sighting).robot == pytest.approx(transform(inverse(pose), [0.066, 0, 0])[2], rel=0.05)
