@@ -17,8 +17,8 @@ import numpy as np
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.types import FloatArray, ImageArray
 
-_SKY_FROM = math.sin(math.radians(15.0))
-"""Sine of the elevation below which the room's walls hide the sky from everywhere within the arm's reach."""
+_WALL_TOP, _FARTHEST_WALL = 2.95, 5.2
+"""Height of the room's walls, and how far a wall can be from a camera on the arm, m."""
 
 
 class View:
@@ -95,7 +95,8 @@ class View:
     def _looks_up(self) -> bool:
         """Whether part of the image may show what is above the walls."""
         upwards = self._data.cam_xmat[self._camera_id].reshape(3, 3)[2]
-        return bool(np.max(self._border @ upwards) > _SKY_FROM)
+        slope = (_WALL_TOP - self._data.cam_xpos[self._camera_id, 2]) / _FARTHEST_WALL
+        return bool(np.max(self._border @ upwards) > slope / math.hypot(1.0, slope))
 
     def close(self) -> None:
         """Free the GL context; may be called twice."""

@@ -124,7 +124,7 @@ class Perception:
         """Forget everything seen."""
         self._frames: deque[_Frame] = deque(maxlen=3)
         self._state: DistanceState | None = None
-        self._own_depths: deque[InverseDepth] = deque(maxlen=_OWN_DEPTHS)
+        self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
 
     @property
     def flow_intrinsics(self) -> Intrinsics:
@@ -212,10 +212,10 @@ class Perception:
             self._own_depths.clear()
             return flow, unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
-        own = target_inverse_depth(flow, twist, widened_on_grid(middle.segmentation.mask, shape, 0))
-        if own is not None:
-            self._own_depths.append(own)
-        inverse_distance, inverse_std = checked_inverse_depth((inverse_distance, inverse_std), self._own_depths)
+        # None takes a place, too: what the motion said long ago is about another distance.
+        self._own_depths.append(target_inverse_depth(flow, twist, widened_on_grid(middle.segmentation.mask, shape, 0)))
+        recent = [own for own in self._own_depths if own is not None]
+        inverse_distance, inverse_std = checked_inverse_depth((inverse_distance, inverse_std), recent)
         gaze = Gaze(twist, inverse_distance, inverse_std, middle.segmentation.mask, middle.T_base_cam)
         return flow, zero_flow_test(flow, gaze, settings.zero_flow, self._self_mask, self.support_height_m)
 

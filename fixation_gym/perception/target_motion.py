@@ -42,7 +42,8 @@ def target_inverse_depth(flow: Flow, twist: FloatArray, target: MaskArray) -> In
     if len(rows) < _LEAST_PIXELS:
         return None
     x, y = (axis[rows, columns] for axis in flow.intrinsics.grid)
-    gx, gy = (part * (flow.intrinsics.fx * flow.period) for part in epipolar_direction(x, y, twist[:3]))
+    gx, gy = epipolar_direction(x, y, twist[:3])
+    gx, gy = gx * (flow.intrinsics.fx * flow.period), gy * (flow.intrinsics.fy * flow.period)
     xx, xy, yy = flow.information[:, rows, columns].astype(np.float64)
     information = gx * gx * xx + 2.0 * gx * gy * xy + gy * gy * yy
     bx, by = flow.gradient[:, rows, columns].astype(np.float64)

@@ -21,7 +21,7 @@ from fixation_gym.experiments.scenarios.scenes import (
     Instance,
     sample_instance,
 )
-from fixation_gym.experiments.scenarios.statistics import bootstrap_ratio, format_table
+from fixation_gym.experiments.scenarios.statistics import bootstrap_ratio, format_table, summarise
 from fixation_gym.experiments.scenarios.view import MARGIN, SceneView
 from fixation_gym.geometry.rigid import inverse, look_at, transform
 
@@ -177,6 +177,15 @@ def test_bad_options_are_refused_with_what_is_allowed(options, message):
 def test_the_command_line_ends_with_one_line_on_bad_input(capsys):
     assert cli.main(["scenarios", "--noise", "loud"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_runs_in_which_the_target_was_never_seen_leave_the_distance_error_out():
+    rules = {rule: {"right": 1, "asked": 1} for rule in ("paper", "exact")}
+    run = {"scene": "opaque", "variant": "lateral", "rules": rules, "objects": [], "unknown": 0, "pixels": 1}
+    runs = [run | {"falsely_moving": 0, "distance_error": error} for error in (None, 0.02, 0.01)]
+    row = summarise(runs)["scenes"]["opaque"][0]
+    assert row["distance_error_worst"] == 0.02
+    assert row["distance_error_median"] == pytest.approx(0.015)
 
 
 def test_the_interval_of_a_ratio_holds_it_and_is_none_without_data():

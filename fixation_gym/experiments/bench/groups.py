@@ -9,12 +9,16 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
 import cv2
 import numpy as np
+
+_PATIENCE_S = 10.0
+"""Time for a process to end by itself, s."""
 
 
 @dataclass(frozen=True)
@@ -113,20 +117,22 @@ class ProcessGroup:
         Raises:
             RuntimeError: if the process failed.
         """
-        self._connection.send((index, seconds))
-        return self._answer()
+        return self._answer((index, seconds))
 
-    def _answer(self) -> Any:
+    def _answer(self, request: tuple[int, float] | None = None) -> Any:
         try:
+            if request is not None:
+                self._connection.send(request)
             return self._connection.recv()
-        except EOFError:
+        except (EOFError, OSError):
             raise RuntimeError("a process of the benchmark failed; its message is above") from None
 
     def close(self) -> None:
         """End the process."""
-        if self._process.is_alive():
+        with suppress(OSError):
             self._connection.send(None)
-        self._process.join()
+        self._process.join(_PATIENCE_S)
+        self._process.terminate()
 
 
 def _serve(connection: Connection, build: Callable[[], Iterable[Case]]) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,12 +70,9 @@ def bench(quick: bool, out: Path) -> dict[str, Any]:
     make_folder(out)
     started = time.monotonic()
     with folder_lock(out):
-        groups = [ProcessGroup(build) for build in all_groups()]
-        try:
+        with ExitStack() as stack:
+            groups = [stack.enter_context(closing(ProcessGroup(build))) for build in all_groups()]
             rows = measure(groups, rounds=5 if quick else 25)
-        finally:
-            for group in groups:
-                group.close()
         rows += lift_reset_rows()
         summary: dict[str, Any] = {"rows": rows, "ratios": ratios_of(rows)}
         if not quick:

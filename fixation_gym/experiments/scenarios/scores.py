@@ -28,8 +28,8 @@ INNER_PX = 3
 """Inner pixels are farther than this from depth edges, px of the flow grid: 6 px of the frames that flow is made of."""
 LEAST_REGION_PX = 40
 """Smaller visible parts of obstacles are not asked about, px of the flow grid."""
-_EDGE = 0.04
-"""Relative jump of depth between neighbours that is an edge."""
+_EDGE = 0.12
+"""Relative difference of depth within 3x3 pixels that is an edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,16 +89,16 @@ def _is_thing(owner: np.ndarray) -> MaskArray:
 def _edges(depth: FloatArray) -> MaskArray:
     small = depth.astype(np.float32)
     kernel = np.ones((3, 3), np.uint8)
-    return np.asarray(cv2.dilate(small, kernel) > (1.0 + 3.0 * _EDGE) * cv2.erode(small, kernel))
+    return np.asarray(cv2.dilate(small, kernel) > (1.0 + _EDGE) * cv2.erode(small, kernel))
 
 
 def answered(look: Look) -> MaskArray:
-    """Pixels that have evidence of their own, shape (h, w): the same for both rules."""
+    """Pixels that have evidence and are not called in front at the outline of something behind, shape (h, w)."""
     return look.percept.zfc.supported & ~look.percept.zfc.outline
 
 
 def calls(look: Look) -> dict[Rule, MaskArray]:
-    """Pixels that each rule calls nearer, shape (h, w); only those that are ``answered`` count."""
+    """Pixels that each rule calls nearer, shape (h, w); only those that are ``supported`` count."""
     percept = look.percept
     with np.errstate(invalid="ignore"):
         exact = percept.zfc.inverse_depth > percept.zfc.fixated_inverse_depth
@@ -107,7 +107,8 @@ def calls(look: Look) -> dict[Rule, MaskArray]:
 
 def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
     """Counts per rule; ratios of their sums are the measures."""
-    asked = answered(look) & (truth.side != 0.0)
+    asked = look.percept.zfc.supported & (truth.side != 0.0)
+    own = answered(look) & asked
     front = truth.side > 0.0
     result: dict[str, dict[str, int]] = {}
     for rule, called in calls(look).items():
@@ -119,6 +120,8 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
         result[rule] = {
             "asked": count(asked),
             "right": count(asked & right),
+            "own": count(own),
+            "own_right": count(own & right),
             "inner": count(asked & truth.inner),
             "inner_right": count(asked & truth.inner & right),
             "front": count(asked & front),

@@ -18,7 +18,6 @@ from fixation_gym.experiments.scenarios.scores import (
     LEAST_REGION_PX,
     RULES,
     PixelTruth,
-    answered,
     pixel_counts,
     pixel_truth,
     votes,
@@ -75,7 +74,7 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
             totals[rule].update(counts)
         still = answers.side != 0.0
         asked += int(np.count_nonzero(still))
-        unknown += int(np.count_nonzero(still & ~answered(look)))
+        unknown += int(np.count_nonzero(still & ~look.percept.zfc.supported))
         moving += int(np.count_nonzero(still & look.percept.zfc.moving))
     objects = [
         _described(obstacle, record, instance, index)
@@ -101,7 +100,7 @@ def _ask(record: _Record, look: Look, answers: PixelTruth, index: int, depth: np
     for rule, (front, behind) in votes(look, region, _VOTE).items():
         side = decide(front, behind, _VOTE)
         if side is Side.FRONT and record.first[rule] is None:
-            record.first[rule] = look.time
+            record.first[rule] = look.percept.time  # when the answer is there, a frame after what it is about
         if settled:
             record.verdicts[rule][side.value] += 1
             record.summed[rule][0] += front

@@ -16,13 +16,14 @@ Run = Mapping[str, Any]
 RULES = ("paper", "exact")
 MEASURES = {
     "sign_accuracy": ("right", "asked"),
+    "sign_accuracy_off_outlines": ("own_right", "own"),
     "inner_sign_accuracy": ("inner_right", "inner"),
     "front_recall": ("front_called", "front"),
     "front_precision": ("front_called", "called"),
     "image_behind": ("image_behind", "image"),
     "inner_image_behind": ("inner_image_behind", "inner_image"),
 }
-"""Ratios of pixel counts summed over the instances."""
+"""Ratios of pixel counts summed over the instances: of all pixels with evidence, but for the second."""
 FIRST_CALL_S = 0.5
 _RESAMPLES = 1000
 ALL = "all"
@@ -76,7 +77,8 @@ def _row(variant: str, runs: Sequence[Run], rule: str) -> dict[str, Any]:
     row["unknown_fraction"], row["unknown_ci95"] = bootstrap_ratio([(run["unknown"], run["pixels"]) for run in runs])
     row["falsely_moving"], _ = bootstrap_ratio([(run["falsely_moving"], run["pixels"]) for run in runs])
     row["distance_error_median"] = median(run["distance_error"] for run in runs)
-    row["distance_error_worst"] = max((run["distance_error"] for run in runs), default=None)
+    known = [run["distance_error"] for run in runs if run["distance_error"] is not None]
+    row["distance_error_worst"] = max(known, default=None)
     return row
 
 
@@ -156,13 +158,18 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-_COLUMNS = ("sign_accuracy", "inner_sign_accuracy", "front_recall", "front_precision", "inner_image_behind")
+_COLUMNS = (
+    *("sign_accuracy", "sign_accuracy_off_outlines", "inner_sign_accuracy"),
+    *("front_recall", "front_precision", "inner_image_behind"),
+)
 
 
 def format_table(summary: Mapping[str, Any]) -> str:
     """Plain-text tables: pixels per scene and variant, paper's rule / exact; obstacles; false alarms."""
     header = (
-        f"{'scene':12}{'variant':10}" + "".join(f"{name:>22}" for name in _COLUMNS) + f"{'votes':>14}{'unknown':>9}"
+        f"{'scene':12}{'variant':10}"
+        + "".join(f"{name.replace('sign_accuracy', 'sign'):>22}" for name in _COLUMNS)
+        + f"{'votes':>14}{'unknown':>9}"
     )
     lines = [f"{header}   (paper / exact)", "-" * len(header)]
     for scene, rows in summary["scenes"].items():
