@@ -64,6 +64,24 @@ def test_the_start_pose_is_the_scenes(sim):
     np.testing.assert_allclose(gaze[:2], 0.0, atol=1e-5)
 
 
+def test_the_model_for_people_has_the_same_physics(sim):
+    physics, people = sim.model, sim.display_model
+    assert people.ngeom > physics.ngeom
+    assert people.nmeshface > 100_000 > physics.nmeshface
+    for model, names in (("jnt", physics.njnt), ("body", physics.nbody)):
+        assert [getattr(physics, model)(i).name for i in range(names)] == [
+            getattr(people, model)(i).name for i in range(names)
+        ]
+    np.testing.assert_array_equal(physics.jnt_qposadr, people.jnt_qposadr)
+    np.testing.assert_allclose(physics.body_mass, people.body_mass)
+    np.testing.assert_allclose(physics.body_inertia, people.body_inertia)
+    touching = {}
+    for name, model in (("physics", physics), ("people", people)):
+        geoms = np.flatnonzero(model.geom_contype + model.geom_conaffinity > 0)
+        touching[name] = {model.geom(i).name: tuple(model.geom_size[i]) for i in geoms}
+    assert touching["physics"] == touching["people"]
+
+
 @pytest.mark.parametrize("scenario", ["opaque", "translucent", "mirror"])
 def test_the_fast_view_shows_what_the_view_in_full_quality_shows(scenario):
     env = gym.make("FixationPick-v0", scenario=scenario, sensor_noise="ideal", image_size=(120, 160)).unwrapped
