@@ -69,10 +69,10 @@ class ScenarioRig:
             RuntimeError: if none is found.
         """
         for _ in range(_TRIES):
-            instance = sample_instance(scene, variant, rng)
             try:
+                instance = sample_instance(scene, variant, rng)
                 self._reset(instance)
-            except RuntimeError:  # out of the arm's reach
+            except RuntimeError:  # no room for the scene in this view, or out of the arm's reach
                 continue
             seen = segment(self._image(self.sim.data.qpos), INTRINSICS)
             if seen.visible and seen.area_fraction > _LEAST_AREA and np.linalg.norm(seen.centroid) < 0.06:
