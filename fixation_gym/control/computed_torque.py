@@ -47,11 +47,9 @@ class ArmTask(NamedTuple):
 
     hand_eye: FloatArray
     """T_hand_cam, shape (4, 4)."""
-    posture: FloatArray
-    """Joint angles towards which the redundancy drifts, shape (n,), rad."""
-    limits: JointLimits
-    torque_limits: FloatArray
-    """Shape (n, 2), N m."""
+    joints: FloatArray
+    """Rows: posture towards which the redundancy drifts, lower and upper limits, rad; largest speeds, rad/s; least and
+    most torques, N m; shape (6, n). One array, since handing over several takes longer than the arithmetic."""
     time_step: float
     """Interval between two calls, s."""
 
@@ -91,7 +89,8 @@ def arm_torques(arm: ArmDynamics, task: ArmTask, twist: FloatArray, command: Flo
         torques: the result, shape (n,), N m.
     """
     _, jacobian = camera_kinematics(arm, task.hand_eye)
-    velocity = joint_velocities(jacobian, twist, arm.joint_pos, task.posture, task.limits)
+    posture, lower, upper, speed, least, most = task.joints
+    velocity = joint_velocities(jacobian, twist, arm.joint_pos, posture, JointLimits(lower, upper, speed))
     joints = len(velocity)
     acceleration = np.empty(joints)
     for k in range(joints):
@@ -109,4 +108,4 @@ def arm_torques(arm: ArmDynamics, task: ArmTask, twist: FloatArray, command: Flo
                 torques[i - back] += inertia * acceleration[i]
         row += i + 1
     for k in range(joints):
-        torques[k] = min(max(torques[k], task.torque_limits[k, 0]), task.torque_limits[k, 1])
+        torques[k] = min(max(torques[k], least[k]), most[k])

@@ -44,9 +44,9 @@ def checked_action(action: Any, size: int) -> FloatArray:
         ValueError: if it has another shape or holds NaN or infinity.
     """
     values = np.asarray(action, dtype=np.float64)
-    if values.shape != (size,) or not np.all(np.isfinite(values)):
+    if values.shape != (size,) or not np.isfinite(values).all():
         raise ValueError(f"action must be {size} finite numbers in [-1, 1], got shape {values.shape}: {values}")
-    return np.clip(values, -1.0, 1.0)
+    return np.minimum(np.maximum(values, -1.0), 1.0)  # several times as fast as np.clip on a few numbers
 
 
 def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:

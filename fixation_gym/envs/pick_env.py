@@ -275,7 +275,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
 
     def _task_state(self) -> rewards.TaskState:
         sim = self.sim
-        distance = float(np.linalg.norm(sim.body_position("target") - sim.tool_position()))
+        distance = math.dist(sim.body_position("target"), sim.tool_position())
         held = self._steps_lifted >= config.HOLD_SECONDS * self.control_frequency
         return rewards.TaskState(distance, sim.target_rise(), held, self._collided)
 

@@ -73,14 +73,10 @@ class PickSim:
         assert np.allclose(self.data.xmat[base].reshape(3, 3), np.eye(3)), "base frame is assumed parallel to the world"
         self._arm = slice(0, 7)
         self._fingers = slice(7, 9)
-        limits = model.jnt_range[:7]
-        self._task = ArmTask(
-            HAND_EYE,
-            posture,
-            JointLimits(limits[:, 0] + 0.02, limits[:, 1] - 0.02, JOINT_SPEED),
-            model.actuator_ctrlrange[:7].copy(),
-            model.opt.timestep,
-        )
+        lower, upper = model.jnt_range[:7].T
+        self._limits = JointLimits(lower + 0.02, upper - 0.02, JOINT_SPEED)
+        joints = np.array([posture, *self._limits, *model.actuator_ctrlrange[:7].T])
+        self._task = ArmTask(HAND_EYE, joints, model.opt.timestep)
         self._arm_dynamics = self._view_arm()
         self._loader = SceneLoader(model)
         self._display: tuple[Any, SceneLoader] | None = None
@@ -133,7 +129,7 @@ class PickSim:
 
     def _inverse_kinematics(self, T_base_cam: FloatArray) -> FloatArray:
         """Joint angles that bring the camera to a pose."""
-        limits = self._task.limits
+        limits = self._limits
         joints, error = self._posture.copy(), np.full(6, np.inf)
         for iteration in range(100):
             self.data.qpos[self._arm] = joints
@@ -173,8 +169,9 @@ class PickSim:
         for substep in range(1, self.substeps + 1):
             mujoco.mj_step1(model, data)
             arm_torques(arm, self._task, camera_twist, self._joint_command, torques)
-            finger = min(max(finger - finger_step, 0.0), 0.04)
-            fingers[:] = finger, -finger
+            if finger_step:
+                finger = min(max(finger - finger_step, 0.0), 0.04)
+                fingers[:] = finger, -finger
             mujoco.mj_step2(model, data)
             if self.obstacles and not collided:
                 collided = contacts.robot_hits_obstacle(model, data, self._compiled.owners)

@@ -12,7 +12,7 @@ from scipy.special import ndtri
 
 from fixation_gym.envs.config import SensorNoise
 from fixation_gym.geometry.rigid import inverse
-from fixation_gym.geometry.twist import adjoint, skew
+from fixation_gym.geometry.twist import adjoint
 from fixation_gym.types import FloatArray, ImageArray
 
 
@@ -70,8 +70,9 @@ def measure_camera_twist(jacobian: FloatArray, joint_vel: FloatArray, errors: Ep
 
 def _small_rotation(vector: FloatArray) -> FloatArray:
     """Rotation matrix of a rotation vector of some mrad, to second order."""
-    hat = skew(vector)
-    return np.eye(3) + hat + 0.5 * hat @ hat
+    x, y, z = vector.tolist()
+    xx, yy, zz, xy, xz, yz = (0.5 * product for product in (x * x, y * y, z * z, x * y, x * z, y * z))
+    return np.array([[1.0 - yy - zz, xy - z, xz + y], [xy + z, 1.0 - xx - zz, yz - x], [xz - y, yz + x, 1.0 - xx - yy]])
 
 
 def measure_image(image: ImageArray, noise: SensorNoise, exposure: float, rng: np.random.Generator) -> ImageArray:

@@ -45,7 +45,7 @@ def test_torques_are_those_of_the_dense_mass_matrix(sim):
     mujoco.mj_step1(model, data)
     twist, command, torques = np.array([0.05, 0, 0.02, 0, 0.1, 0]), data.qpos[:7] + 0.001, np.zeros(7)
     _, jacobian = camera_kinematics(arm, HAND_EYE)
-    velocity = joint_velocities(jacobian, twist, data.qpos[:7].copy(), sim._task.posture, sim._task.limits)
+    velocity = joint_velocities(jacobian, twist, data.qpos[:7].copy(), sim._posture, sim._limits)
     lead = command + velocity * model.opt.timestep - data.qpos[:7]
     acceleration = computed_torque._VELOCITY_GAIN * (velocity - data.qvel[:7]) + computed_torque._POSITION_GAIN * lead
     mass = np.zeros((model.nv, model.nv))
