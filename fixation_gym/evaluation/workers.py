@@ -23,7 +23,7 @@ _worlds: dict[tuple[Any, ...], tuple[gymnasium.Env, Policy]] = {}  # at most one
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
-    """Run the episode that a cell describes and return its ``EpisodeResult`` as a dict.
+    """Run the episode that a cell describes and return its ``EpisodeResult`` as a dict, with the trace.
 
     The environment stays alive for the next cell of the same scenario: building one takes seconds, a reset does not.
     """
@@ -35,7 +35,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
         _worlds[key] = (env, make_policy(cell["policy"], env))
     env, policy = _worlds[key]
     result = run_episode(env, policy, cell["seed"], scenario=cell["scenario"], policy_name=cell["policy"])
-    return result.to_json()
+    return {**result.to_json(), "trace": result.trace}
 
 
 def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "overlay") -> gymnasium.Env:
