@@ -12,12 +12,15 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import tyro
 
 from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
+
+if TYPE_CHECKING:
+    from fixation_gym.evaluation.rollout import EpisodeResult
 
 
 class Command(Protocol):
@@ -64,7 +67,7 @@ class Evaluate:
     """Evaluate a policy over scenarios and seeds. The same command again resumes a run that was killed."""
 
     policy: str = "servo"
-    """servo, blind, random or oracle."""
+    """servo, blind, random, oracle or a variant of the servo, such as servo:no_retry."""
     scenario: str = "clear,opaque,translucent,mirror"
     """Scenario names, separated by commas."""
     episodes: int = 20
@@ -79,6 +82,8 @@ class Evaluate:
     """Number of processes."""
     backend: str = "loky"
     """Where the processes run: loky (this machine) or ray (a Ray cluster)."""
+    film_failures: bool = False
+    """Run every failed episode again, and keep six moments of it as a picture in the folder clips."""
     out: Path = Path("out/evaluate")
     """Folder of the results."""
 
@@ -102,6 +107,10 @@ class Evaluate:
         from fixation_gym.evaluation.storage import SUMMARY_FILE
 
         summary = evaluate(config, self.out)
+        if self.film_failures:
+            from fixation_gym.evaluation.clips import film_failures
+
+            print_different(film_failures(self.out, self.workers, self.backend))
         print(format_table(summary["scenarios"]))
         print(f"\n{self.out / SUMMARY_FILE}")
         return 0
@@ -197,6 +206,12 @@ Commands = (
 def split_names(text: str) -> tuple[str, ...]:
     """Split "a,b" into ("a", "b")."""
     return tuple(name.strip() for name in text.split(","))
+
+
+def print_different(results: Sequence[EpisodeResult]) -> None:
+    """Say which episodes could not be filmed because they came out differently."""
+    for result in results:
+        print(f"{result.scenario} seed {result.seed} came out differently when it was run again: not filmed")
 
 
 def parse(argv: Sequence[str] | None) -> Command:
