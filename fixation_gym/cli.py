@@ -117,6 +117,28 @@ class Evaluate:
 
 
 @dataclass(frozen=True)
+class Report:
+    """One HTML page from folders of evaluations: tables with intervals, paired comparisons, paths, failures."""
+
+    folders: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders that evaluate or ablate wrote; the first policy is the reference of comparisons."""
+    gallery: int = 40
+    """Most failures to show with pictures; all are listed."""
+    title: str = "Picking by gaze fixation"
+    """Heading of the page."""
+    out: Path = Path("out/report")
+    """Folder of the page; an earlier report there is replaced."""
+
+    def run(self) -> int:
+        """Write the page and print where it is."""
+        from fixation_gym.reporting.report import REPORT_FILE, write_report
+
+        write_report(self.folders, self.out, self.gallery, self.title)
+        print(self.out / REPORT_FILE)
+        return 0
+
+
+@dataclass(frozen=True)
 class Distance:
     """Error of the distance against distance, fixating and only translating. The same command again resumes."""
 
@@ -197,6 +219,7 @@ class Doctor:
 Commands = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
