@@ -12,15 +12,13 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Protocol
+from typing import Annotated, Protocol
 
 import tyro
 
 from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
-
-if TYPE_CHECKING:
-    from fixation_gym.evaluation.rollout import EpisodeResult
+from fixation_gym.report_commands import Ablate, Report, print_different, split_names
 
 
 class Command(Protocol):
@@ -117,28 +115,6 @@ class Evaluate:
 
 
 @dataclass(frozen=True)
-class Report:
-    """One HTML page from folders of evaluations: tables with intervals, paired comparisons, paths, failures."""
-
-    folders: tyro.conf.Positional[tuple[Path, ...]]
-    """Folders that evaluate or ablate wrote; the first policy is the reference of comparisons."""
-    gallery: int = 40
-    """Most failures to show with pictures; all are listed."""
-    title: str = "Picking by gaze fixation"
-    """Heading of the page."""
-    out: Path = Path("out/report")
-    """Folder of the page; an earlier report there is replaced."""
-
-    def run(self) -> int:
-        """Write the page and print where it is."""
-        from fixation_gym.reporting.report import REPORT_FILE, write_report
-
-        write_report(self.folders, self.out, self.gallery, self.title)
-        print(self.out / REPORT_FILE)
-        return 0
-
-
-@dataclass(frozen=True)
 class Distance:
     """Error of the distance against distance, fixating and only translating. The same command again resumes."""
 
@@ -219,22 +195,12 @@ class Doctor:
 Commands = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Ablate, tyro.conf.subcommand("ablate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
-
-
-def split_names(text: str) -> tuple[str, ...]:
-    """Split "a,b" into ("a", "b")."""
-    return tuple(name.strip() for name in text.split(","))
-
-
-def print_different(results: Sequence[EpisodeResult]) -> None:
-    """Say which episodes could not be filmed because they came out differently."""
-    for result in results:
-        print(f"{result.scenario} seed {result.seed} came out differently when it was run again: not filmed")
 
 
 def parse(argv: Sequence[str] | None) -> Command:

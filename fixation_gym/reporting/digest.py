@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -75,13 +74,14 @@ def labels(evaluations: Sequence[Evaluation]) -> list[str]:
     """Name of the policy, with what tells evaluations of one policy apart; the folder's name if nothing does."""
     names = [str(evaluation.run["policy"]) for evaluation in evaluations]
     for field in ("sensor_noise", "image_size", "seed", "folder"):
-        counts = Counter(names)
-        for index, evaluation in enumerate(evaluations):
-            name = names[index]
-            same = [other for other, label in zip(evaluations, names, strict=True) if label == name]
-            if counts[name] > 1 and len({_value(other, field) for other in same}) > 1:
-                names[index] = f"{name}\0{_value(evaluation, field)}"
-    return [name.replace("\0", ", ") for name in names]
+        values: dict[str, set[str]] = {}
+        for name, evaluation in zip(names, evaluations, strict=True):
+            values.setdefault(name, set()).add(_value(evaluation, field))
+        names = [
+            f"{name}, {_value(evaluation, field)}" if len(values[name]) > 1 else name
+            for name, evaluation in zip(names, evaluations, strict=True)
+        ]
+    return names
 
 
 def scenario_names(records: Sequence[PolicyRecord]) -> list[str]:

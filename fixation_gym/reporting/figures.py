@@ -47,13 +47,14 @@ def png(figure: Figure, dpi: int = 110) -> bytes:
 def success_figure(records: Sequence[PolicyRecord], scenarios: Sequence[str]) -> bytes:
     """Rates over scenarios with Wilson intervals: filled for collision-free success, hollow for success."""
     width = min(0.8, 0.22 * len(records))
-    figure = new_figure(max(6.0, 2.2 + len(scenarios) * (0.5 + 0.28 * len(records))), 3.6)
+    figure = new_figure(max(8.0, 2.2 + len(scenarios) * (0.5 + 0.28 * len(records))), 3.6)
     axis = figure.subplots()
     places = np.arange(len(scenarios))
     for index, record in enumerate(records):
         offset = width * ((index + 0.5) / len(records) - 0.5)
         for hollow in (True, False):
             _rates(axis, places + offset, record, scenarios, colour_of(index), hollow)
+        axis.plot([], [], "o", color=colour_of(index), label=record.label)
     for place in places[1:]:
         axis.axvline(place - 0.5, color="0.9", linewidth=0.8, zorder=0)
     axis.set(ylim=(-3, 103), ylabel="%", xlim=(-0.5, len(scenarios) - 0.5))
@@ -100,9 +101,8 @@ def _rates(
         low, high = (100.0 * bound for bound in wilson_interval(wins, len(results)))
         shift = 0.035 if hollow else -0.035
         axis.plot([place + shift] * 2, [low, high], color=colour, linewidth=1.2, alpha=0.45 if hollow else 1.0)
-        label = record.label if not hollow and scenario == scenarios[0] else None
         face = "white" if hollow else colour
-        axis.plot(place + shift, rate, "o", color=colour, markerfacecolor=face, markersize=6, label=label)
+        axis.plot(place + shift, rate, "o", color=colour, markerfacecolor=face, markersize=6)
 
 
 def _errors(axis: Axes, times: FloatArray, curves: FloatArray, colour: str, label: str | None) -> None:

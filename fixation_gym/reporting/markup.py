@@ -17,15 +17,14 @@ body { font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; 
   background: var(--ground); max-width: 72rem; margin: 0 auto; padding: 1.5rem 1.2rem 4rem; }
 h1 { font-size: 1.7rem; margin: 0.5rem 0; } h2 { font-size: 1.25rem; margin: 2.6rem 0 0.6rem; }
 h3 { font-size: 1.02rem; margin: 1.6rem 0 0.4rem; } p { margin: 0.5rem 0; max-width: 52rem; } a { color: var(--link); }
-.note, figcaption, caption, small { color: var(--soft); font-size: 0.87rem; }
+.note, figcaption, small { color: var(--soft); font-size: 0.87rem; }
 nav a { margin-right: 1rem; white-space: nowrap; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; margin: 0.6rem 0 1rem; font-variant-numeric: tabular-nums; }
-caption { text-align: left; padding-bottom: 0.3rem; }
+table { border-collapse: collapse; margin: 0.2rem 0 1.2rem; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.32rem 0.7rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
 thead th { border-bottom: 2px solid var(--line); font-weight: 600; }
 tbody th { font-weight: 600; white-space: nowrap; }
-td small { white-space: nowrap; } td.number { text-align: right; }
+td small { white-space: nowrap; }
 figure { margin: 0.8rem 0; } figure img { max-width: 100%; height: auto; border-radius: 4px; display: block; }
 code, pre { font: 0.86rem/1.45 ui-monospace, SFMono-Regular, Menlo, Consolas, monospace; }
 pre { background: var(--card); padding: 0.7rem 0.9rem; border-radius: 4px; overflow-x: auto; }
@@ -82,13 +81,13 @@ def element(tag: str, content: str, kind: str = "", anchor: str = "") -> Html:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], caption: str) -> Html:
-    """A table whose first column names the rows."""
+    """A table whose first column names the rows, below a line of text."""
     top = "".join(element("th", cell) for cell in head)
     body = "\n".join(
         f"<tr>{element('th', row[0])}{''.join(element('td', cell) for cell in row[1:])}</tr>" for row in rows
     )
     return Html(
-        f'<div class="wide"><table>{element("caption", caption)}\n<thead><tr>{top}</tr></thead>\n'
+        f'{element("p", caption, "note")}\n<div class="wide"><table>\n<thead><tr>{top}</tr></thead>\n'
         f"<tbody>\n{body}\n</tbody></table></div>"
     )
 

@@ -39,7 +39,7 @@ _MARGIN_M = 0.03
 
 def path_figure(paths: Sequence[tuple[str, str, Trace]]) -> bytes:
     """Paths of (label, colour, trace) of one scene, from above and from the side."""
-    figure = new_figure(9.0, 3.9)
+    figure = new_figure(10.5, 4.0)
     above, side = figure.subplots(1, 2)
     draw_paths(above, side, paths)
     above.legend(fontsize=8, frameon=False, loc="best")
@@ -114,10 +114,12 @@ def draw_distance(axis: Axes, colour: str, trace: Trace, failure: Failure | None
     axis.plot(trace.time_s, 100.0 * trace.clearance_m, color="#8c6d46", linewidth=0.9, label="clearance")
     if failure is not None and failure.time_s is not None:
         axis.axvline(failure.time_s, color="black", linewidth=1.0)
-        axis.text(failure.time_s, 0.88, f" {failure.kind.value}", fontsize=8, va="top", transform=_across(axis))
+        side = "right" if failure.time_s > 0.6 * trace.time_s[-1] else "left"
+        text = f" {failure.kind.value} "
+        axis.text(failure.time_s, 0.91, text, fontsize=8, va="top", ha=side, transform=_across(axis))
     axis.set(xlim=(0.0, trace.time_s[-1]), ylim=(-2.0, 70.0), xlabel="time, s", ylabel="cm")
     axis.tick_params(labelsize=8)
-    axis.legend(fontsize=7, loc="upper right", bbox_to_anchor=(1.0, 0.93), framealpha=0.7)
+    axis.legend(fontsize=7, loc="upper right", bbox_to_anchor=(1.0, 0.83), framealpha=0.7)
 
 
 def phase_spans(trace: Trace) -> list[tuple[str, float, float]]:
