@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,14 +61,16 @@ def read_evaluation(folder: Path) -> Evaluation:
     return Evaluation(folder, run, summary, tuple(results))
 
 
-def evaluation_folders(folders: Iterable[Path]) -> list[Path]:
+def evaluation_folders(folders: Sequence[Path]) -> list[Path]:
     """Replace each folder that only holds folders of evaluations, as ``ablate`` leaves it, by those.
 
     The folder of the full servo comes first, the others by name.
 
     Raises:
-        UsageError: if a folder does not exist, or has neither.
+        UsageError: without folders, or if one does not exist or has neither.
     """
+    if not folders:
+        raise UsageError("name one or more folders that evaluate or ablate wrote")
     found: list[Path] = []
     for folder in folders:
         if not folder.is_dir():

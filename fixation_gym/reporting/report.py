@@ -50,11 +50,11 @@ def write_report(folders: Sequence[Path], out: Path, pictures: int, title: str) 
         raise UsageError(f"--gallery must be 0 or more, got {pictures}")
     records = digest([read_evaluation(folder) for folder in evaluation_folders(folders)])
     check_report_folder(out)
-    text = report_page(records, title, pictures)
-    summary = report_summary(records)
     make_folder(out)
     with folder_lock(out):
         check_no_folders(out, (REPORT_FILE, SUMMARY_FILE))
+        text = report_page(records, title, pictures)
+        summary = report_summary(records)
         try:
             write_file(out / REPORT_FILE, text.encode())
             write_json(out / SUMMARY_FILE, summary)

@@ -146,3 +146,9 @@ def test_what_cannot_be_reported_leaves_nothing(tmp_path: Path, servo_folder: Pa
     with pytest.raises(UsageError, match="--gallery must be 0 or more"):
         write_report([servo_folder], tmp_path / "out", -1, "Title")
     assert not (tmp_path / "out").exists()
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(UsageError, match="cannot write to the output folder"):
+        write_report([servo_folder], tmp_path / "file" / "out", 0, "Title")
+    (tmp_path / "taken" / "report.html").mkdir(parents=True)
+    with pytest.raises(UsageError, match=r"report\.html is a folder where a file is needed"):
+        write_report([servo_folder], tmp_path / "taken", 0, "Title")
