@@ -18,6 +18,7 @@ import tyro
 
 from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
+from fixation_gym.report_commands import Ablate, Report, print_different, split_names
 
 
 class Command(Protocol):
@@ -64,7 +65,7 @@ class Evaluate:
     """Evaluate a policy over scenarios and seeds. The same command again resumes a run that was killed."""
 
     policy: str = "servo"
-    """servo, blind, random or oracle."""
+    """servo, blind, random, oracle or a variant of the servo, such as servo:no_retry."""
     scenario: str = "clear,opaque,translucent,mirror"
     """Scenario names, separated by commas."""
     episodes: int = 20
@@ -79,6 +80,8 @@ class Evaluate:
     """Number of processes."""
     backend: str = "loky"
     """Where the processes run: loky (this machine) or ray (a Ray cluster)."""
+    film_failures: bool = False
+    """Run every failed episode again, and keep six moments of it as a picture in the folder clips."""
     out: Path = Path("out/evaluate")
     """Folder of the results."""
 
@@ -102,6 +105,10 @@ class Evaluate:
         from fixation_gym.evaluation.storage import SUMMARY_FILE
 
         summary = evaluate(config, self.out)
+        if self.film_failures:
+            from fixation_gym.evaluation.clips import film_failures
+
+            print_different(film_failures(self.out, self.workers, self.backend))
         print(format_table(summary["scenarios"]))
         print(f"\n{self.out / SUMMARY_FILE}")
         return 0
@@ -223,16 +230,13 @@ class Doctor:
 Commands = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Ablate, tyro.conf.subcommand("ablate")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Scenarios, tyro.conf.subcommand("scenarios")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )
-
-
-def split_names(text: str) -> tuple[str, ...]:
-    """Split "a,b" into ("a", "b")."""
-    return tuple(name.strip() for name in text.split(","))
 
 
 def parse(argv: Sequence[str] | None) -> Command:

@@ -8,8 +8,9 @@ from fixation_gym.perception.pipeline import Perception
 from policies.base import Policy
 from policies.baselines import RandomPolicy
 from policies.servo.servo_policy import ServoPolicy
+from policies.servo.variants import VARIANT_NAMES, servo_variant
 
-POLICY_NAMES = ("servo", "blind", "random", "oracle")
+POLICY_NAMES = ("servo", "blind", "random", "oracle", *(name for name in VARIANT_NAMES if ":" in name))
 
 
 def make_policy(name: str, env: Any) -> Policy:
@@ -32,5 +33,6 @@ def make_policy(name: str, env: Any) -> Policy:
         return OraclePolicy(env.unwrapped)
     from fixation_gym.envs.scene import TABLE_HEIGHT
 
-    perception = Perception(env.unwrapped.intrinsics, support_height_m=TABLE_HEIGHT)
-    return ServoPolicy(perception, avoid_obstacles=name == "servo")
+    variant = servo_variant(name)
+    perception = Perception(env.unwrapped.intrinsics, variant.perception, support_height_m=TABLE_HEIGHT)
+    return ServoPolicy(perception, variant.gains, avoid_obstacles=variant.avoid_obstacles)

@@ -8,13 +8,15 @@ from typing import Any
 
 import pytest
 
-from fixation_gym import cli, doctor, gl
-from fixation_gym.evaluation import demo, evaluate
+from fixation_gym import cli, doctor, gl, report_commands
+from fixation_gym.evaluation import clips, demo, evaluate
+from fixation_gym.reporting import ablation
 
 
 @pytest.fixture(autouse=True)
 def _no_gl(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cli, "select_backend", lambda: "egl")
+    for module in (cli, report_commands):
+        monkeypatch.setattr(module, "select_backend", lambda: "egl")
 
 
 def error_line(capsys: pytest.CaptureFixture[str]) -> str:
@@ -25,7 +27,7 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
     return captured.err
 
 
-@pytest.mark.parametrize("command", ["demo", "evaluate"])
+@pytest.mark.parametrize("command", ["demo", "evaluate", "ablate"])
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
@@ -42,6 +44,8 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
 def test_bad_input_is_one_line_and_leaves_no_folder(
     command: str, option: str, value: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    if (command, option) == ("ablate", "--policy"):  # ablations have variants instead
+        option, message = "--variant", "unknown variant 'best'; choose one of servo, blind, servo:no_feed_forward"
     assert cli.main([command, "--out", str(tmp_path / "out"), option, value]) == 2
     assert message in error_line(capsys)
     assert list(tmp_path.iterdir()) == []
@@ -53,10 +57,12 @@ def test_a_missing_or_unknown_command_names_the_commands(
 ) -> None:
     assert cli.main(arguments) == 2
     line = error_line(capsys)
-    assert all(command in line for command in ("demo", "evaluate", "distance", "scenarios", "doctor"))
+    assert all(
+        command in line for command in ("demo", "evaluate", "ablate", "report", "distance", "scenarios", "doctor")
+    )
 
 
-@pytest.mark.parametrize("command", ["demo", "evaluate", "distance", "scenarios", "doctor"])
+@pytest.mark.parametrize("command", ["demo", "evaluate", "ablate", "distance", "scenarios", "doctor"])
 def test_an_output_folder_that_cannot_be_written_is_one_line(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -66,7 +72,7 @@ def test_an_output_folder_that_cannot_be_written_is_one_line(
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.parametrize("command", ["demo", "evaluate", "distance", "scenarios"])
+@pytest.mark.parametrize("command", ["demo", "evaluate", "ablate", "distance", "scenarios"])
 def test_a_missing_gl_library_is_one_line_and_leaves_no_folder(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -74,6 +80,7 @@ def test_a_missing_gl_library_is_one_line_and_leaves_no_folder(
         raise gl.MissingGLError("no GL library renders here; apt-get install libegl1")
 
     monkeypatch.setattr(cli, "select_backend", select_backend)
+    monkeypatch.setattr(report_commands, "select_backend", select_backend)
     assert cli.main([command, "--out", str(tmp_path / "out")]) == 2
     assert "no GL library renders here" in error_line(capsys)
     assert list(tmp_path.iterdir()) == []
@@ -97,6 +104,60 @@ def test_evaluate_passes_its_options_on_and_prints_the_table(
         )
     ]
     assert capsys.readouterr().out.startswith("scenario")
+
+
+def test_failures_are_filmed_if_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filmed: list[Path] = []
+
+    def film(folder: Path, processes: int, backend: str) -> list[Any]:
+        filmed.append(folder)
+        return []
+
+    monkeypatch.setattr(evaluate, "evaluate", lambda config, out: evaluate.summary_of(config, [], 0.0))
+    monkeypatch.setattr(clips, "film_failures", film)
+    assert cli.main(["evaluate", "--out", str(tmp_path)]) == 0
+    assert filmed == []
+    assert cli.main(["evaluate", "--out", str(tmp_path), "--film-failures"]) == 0
+    assert filmed == [tmp_path]
+
+
+def test_ablate_always_runs_the_full_servo_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[tuple[str, ...]] = []
+
+    def fake_ablate(config: evaluate.EvaluationConfig, variants: tuple[str, ...], *rest: Any) -> Any:
+        seen.append(variants)
+        return {"policies": {}, "success_differences": []}, []
+
+    monkeypatch.setattr(ablation, "ablate", fake_ablate)
+    assert cli.main(["ablate", "--out", str(tmp_path), "--variant", "servo:no_retry,blind"]) == 0
+    assert seen == [("servo", "servo:no_retry", "blind")]
+    assert str(tmp_path / "report.html") in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "folders"),
+        (["nowhere"], "nowhere is no folder"),
+        (["."], "has no episodes.jsonl; give folders that evaluate or ablate wrote"),
+        ([".", "--gallery", "-1"], "--gallery must be 0 or more"),
+    ],
+)
+def test_a_report_of_nothing_is_one_line_and_leaves_no_folder(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["report", *arguments, "--out", "out"]) == 2
+    assert message in error_line(capsys)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_demo_films_four_scenarios_by_default(

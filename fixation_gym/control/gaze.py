@@ -22,6 +22,8 @@ class GazeGains:
 
     gaze_gain: float = 4.0
     """lambda_XY of Eq. 6: decay rate of the target's offset from the image centre, 1/s."""
+    feed_forward: bool = True
+    """Whether the flow that the camera's own motion causes is fed forward; the paper's Eq. 6 does without."""
     roll_gain: float = 1.5
     """Rate at which the roll error decays, 1/s."""
     max_roll: float = math.radians(50.0)
@@ -88,7 +90,8 @@ def fixating_twist(
         gains: of gaze and roll.
     """
     w_z = servo_laws.roll_rate(roll_error, gains.roll_gain)
-    w = servo_laws.gaze_rotation(centroid, gains.gaze_gain, 1.0 / distance, v, w_z)
+    fed_v, fed_w_z = (v, w_z) if gains.feed_forward else (np.zeros(3), 0.0)
+    w = servo_laws.gaze_rotation(centroid, gains.gaze_gain, 1.0 / distance, fed_v, fed_w_z)
     return np.array([*v, *w, w_z])
 
 

@@ -120,11 +120,15 @@ def _film(
         last[:] = [frame]
         count += 1
 
-    result = run_episode(env, policy, seed, on_frame, scenario, config.policy, FRAME_STRIDE)
+    result = run_episode(env, policy, seed, on_frame, scenario, config.policy, filmed=_every_stride)
     text = f"{scenario}   seed {seed}   {result.time_s:5.1f} s   {_outcome(result)}"
     for _ in range(_OUTCOME_FRAMES):
         video.add(caption(last[0], text))
     return result, [*kept, caption(shrink(last[0], SHEET_CELL_WIDTH), text)]
+
+
+def _every_stride(step: int) -> bool:
+    return step % FRAME_STRIDE == 0
 
 
 def _outcome(result: EpisodeResult) -> str:

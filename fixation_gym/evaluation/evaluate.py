@@ -17,6 +17,7 @@ from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.report import summarise
 from fixation_gym.evaluation.rollout import EpisodeResult
+from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeKey, EpisodeStore, write_json
 
 SEED_BLOCK = 100_000
@@ -150,6 +151,7 @@ def summary_of(config: EvaluationConfig, results: Sequence[EpisodeResult], wall_
         "sensor_noise": config.sensor_noise,
         "image_size": list(config.image_size),
         "versions": installed_versions(),
+        "commit": source_commit(),
         "gl": os.environ.get("MUJOCO_GL"),
         "wall_s": wall_s,
     }

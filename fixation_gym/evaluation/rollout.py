@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from fixation_gym.evaluation.scene_truth import scene_of
 from fixation_gym.evaluation.statistics import mean, minimum, root_mean_square
-from policies.base import Policy
+from fixation_gym.evaluation.trace import Trace, TraceRecorder
+from policies.base import Estimate, Policy
 
 APPROACH = "approach"
 GRASP = "grasp"
@@ -24,7 +26,7 @@ FrameCallback = Callable[[NDArray[np.uint8]], None]
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """Measurements of one episode; None where there was nothing to measure. All values are JSON-able."""
+    """Measurements of one episode; None where there was nothing to measure. All but the trace are JSON-able."""
 
     scenario: str
     policy: str
@@ -49,13 +51,18 @@ class EpisodeResult:
     min_clearance_m: float | None
     """Smallest distance between robot and obstacles, m; 0.5 also where they are further apart or there is none."""
 
+    trace: Trace | None = field(default=None, compare=False, repr=False)
+    """What happened step by step, if known; it is kept in a file of its own."""
+
     def to_json(self) -> dict[str, Any]:
-        """A dict of JSON values."""
-        return asdict(self)
+        """A dict of JSON values, without the trace."""
+        values = asdict(replace(self, trace=None))
+        del values["trace"]
+        return values
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> EpisodeResult:
-        """The inverse of ``to_json``.
+        """The inverse of ``to_json``; ``values`` may also hold a ``trace``.
 
         Raises:
             TypeError: if a field is missing or unknown.
@@ -79,6 +86,11 @@ class Step:
         return abs(self.distance_m - self.distance_true_m)
 
 
+def every_decision(step: int) -> bool:
+    """Film all decisions."""
+    return True
+
+
 def run_episode(
     env: gymnasium.Env,
     policy: Policy,
@@ -86,7 +98,7 @@ def run_episode(
     on_frame: FrameCallback | None = None,
     scenario: str = "",
     policy_name: str = "",
-    frame_stride: int = 1,
+    filmed: Callable[[int], bool] = every_decision,
 ) -> EpisodeResult:
     """Run one episode to its end.
 
@@ -98,37 +110,54 @@ def run_episode(
         on_frame: called with ``env.render()`` at decisions, after the policy has seen the observation, and at the end.
         scenario: name written to the result.
         policy_name: name written to the result.
-        frame_stride: every ``frame_stride``-th decision is rendered.
+        filmed: tells which decisions are rendered, by their number from 0.
     """
     obs, info = env.reset(seed=seed)
     policy.reset(seed)
+    recorder = TraceRecorder(scene_of(env))
     steps: list[Step] = []
-    clearances = [float(info["clearance_m"])]
     total = 0.0
     reward_terms: dict[str, float] = {}
     terminated = truncated = False
     while not (terminated or truncated):
         action = policy.act(obs)
-        steps.append(_record(policy, info))
-        if on_frame is not None and (len(steps) - 1) % frame_stride == 0:
+        estimate = getattr(policy, "estimate", None)
+        recorder.add(obs, info, estimate)
+        steps.append(_record(estimate, info))
+        if on_frame is not None and filmed(len(steps) - 1):
             on_frame(_render(env))
         obs, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
-        clearances.append(float(info["clearance_m"]))
         for term, value in info["reward_terms"].items():
             reward_terms[term] = reward_terms.get(term, 0.0) + float(value)
     if on_frame is not None:
         on_frame(_render(env))
-    success, collision = bool(info["is_success"]), bool(info["collision"])
+    recorder.add_end(obs, info)
+    return _result(
+        (scenario, policy_name, seed), steps, recorder.trace(), bool(info["is_success"]), total, reward_terms
+    )
+
+
+def _result(
+    names: tuple[str, str, int],
+    steps: Sequence[Step],
+    trace: Trace,
+    success: bool,
+    total: float,
+    reward_terms: dict[str, float],
+) -> EpisodeResult:
+    """Measurements of an episode with these decisions; ``names`` are scenario, policy and seed."""
+    scenario, policy, seed = names
     gazing = [step for step in steps if step.phase is None or step.phase in GAZE_PHASES]
+    collision = bool(trace.collided[-1])
     return EpisodeResult(
         scenario=scenario,
-        policy=policy_name,
+        policy=policy,
         seed=seed,
         success=success,
         collision=collision,
         collision_free_success=success and not collision,
-        time_s=float(np.asarray(obs["time"]).item()),
+        time_s=float(trace.time_s[-1]),
         steps=len(steps),
         return_=total,
         reward_terms=reward_terms,
@@ -136,7 +165,8 @@ def run_episode(
         distance_error_at_grasp_m=error_at_grasp(steps),
         distance_mae_m=mean(step.distance_error_m for step in gazing),
         fixation_rms_px=root_mean_square(step.fixation_error_px for step in gazing),
-        min_clearance_m=minimum(clearances),
+        min_clearance_m=minimum(trace.clearance_m),
+        trace=trace,
     )
 
 
@@ -148,9 +178,8 @@ def error_at_grasp(steps: Sequence[Step]) -> float | None:
     return None
 
 
-def _record(policy: Policy, info: Mapping[str, Any]) -> Step:
+def _record(estimate: Estimate | None, info: Mapping[str, Any]) -> Step:
     """Pair the policy's estimate with the truth of the observation that it was made from."""
-    estimate = getattr(policy, "estimate", None)
     return Step(
         phase=None if estimate is None else str(estimate.phase),
         distance_m=math.nan if estimate is None else float(estimate.distance_m),

@@ -12,12 +12,14 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.rollout import EpisodeResult
+from fixation_gym.evaluation.trace import TRACES_FOLDER, trace_file, write_trace
 
 RUN_FILE = "run.json"
 EPISODES_FILE = "episodes.jsonl"
@@ -185,6 +187,8 @@ class EpisodeStore(ResultStore[EpisodeKey, EpisodeResult]):
 
     def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
         """Start or resume a run; see ``ResultStore``. ``run`` leaves out scenario and seed of the episodes."""
+        if (folder / TRACES_FOLDER).is_file():
+            raise UsageError(f"{folder / TRACES_FOLDER} is a file where a folder is needed; choose another --out")
         super().__init__(
             folder,
             run,
@@ -193,6 +197,12 @@ class EpisodeStore(ResultStore[EpisodeKey, EpisodeResult]):
             from_json=EpisodeResult.from_json,
             to_json=EpisodeResult.to_json,
         )
+
+    def append(self, result: EpisodeResult) -> None:
+        """Store a finished episode, its trace first: whatever has a line also has its trace."""
+        if result.trace is not None:
+            write_trace(trace_file(self.folder, result.scenario, result.seed), result.trace)
+        super().append(replace(result, trace=None))
 
 
 def _check_run(results: Path, run: Mapping[str, Any]) -> None:

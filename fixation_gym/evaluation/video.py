@@ -109,21 +109,39 @@ def contact_sheet(frames: Sequence[ImageArray], columns: int) -> ImageArray:
     return sheet
 
 
+def jpeg(image: ImageArray, quality: int) -> bytes:
+    """An RGB image as JPEG; quality is 0 to 100."""
+    return _encoded(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+
+
 def write_png(path: Path, image: ImageArray) -> None:
     """Write an RGB image, completely or not at all.
 
     Raises:
         OSError: if it cannot be written.
     """
-    ok, data = cv2.imencode(".png", image[..., ::-1])  # OpenCV's channel order is BGR
-    if not ok:
-        raise OSError(f"cannot encode {path}")
+    write_file(path, _encoded(".png", image, []))
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write a file, completely or not at all.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
     temporary = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
-        temporary.write_bytes(data.tobytes())
+        temporary.write_bytes(data)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _encoded(extension: str, image: ImageArray, options: list[int]) -> bytes:
+    ok, data = cv2.imencode(extension, image[..., ::-1], options)  # OpenCV's channel order is BGR
+    if not ok:
+        raise OSError(f"cannot encode an image of shape {image.shape} as {extension}")
+    return data.tobytes()
 
 
 def evenly_spaced(frames: Sequence[ImageArray], count: int) -> list[ImageArray]:

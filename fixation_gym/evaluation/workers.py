@@ -23,19 +23,25 @@ _worlds: dict[tuple[Any, ...], tuple[gymnasium.Env, Policy]] = {}  # at most one
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
-    """Run the episode that a cell describes and return its ``EpisodeResult`` as a dict.
+    """Run the episode that a cell describes and return its ``EpisodeResult`` as a dict, with the trace."""
+    env, policy = world(cell)
+    result = run_episode(env, policy, cell["seed"], scenario=cell["scenario"], policy_name=cell["policy"])
+    return {**result.to_json(), "trace": result.trace}
 
-    The environment stays alive for the next cell of the same scenario: building one takes seconds, a reset does not.
+
+def world(cell: Cell, render_mode: str | None = None) -> tuple[gymnasium.Env, Policy]:
+    """Environment and policy of a cell.
+
+    They stay alive for the next cell of the same scenario: building an environment takes seconds, a reset does not.
     """
     key = tuple((name, value) for name, value in sorted(cell.items()) if name != "seed")
     key = tuple((name, tuple(value) if isinstance(value, list) else value) for name, value in key)
+    key = (render_mode, *key)
     if key not in _worlds:
         close_worlds()
-        env = make_env(cell)
+        env = make_env(cell, render_mode)
         _worlds[key] = (env, make_policy(cell["policy"], env))
-    env, policy = _worlds[key]
-    result = run_episode(env, policy, cell["seed"], scenario=cell["scenario"], policy_name=cell["policy"])
-    return result.to_json()
+    return _worlds[key]
 
 
 def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "overlay") -> gymnasium.Env:
@@ -67,7 +73,7 @@ def make_policy(name: str, env: gymnasium.Env) -> Policy:
 
 @atexit.register
 def close_worlds() -> None:
-    """Close the environment that ``run_cell`` keeps alive in this process."""
+    """Close the environment that ``world`` keeps alive in this process."""
     while _worlds:
         _, (env, _) = _worlds.popitem()
         env.close()

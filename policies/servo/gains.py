@@ -51,5 +51,7 @@ class ServoGains:
     """Relative distance error needed for the grasp."""
     grasp_centred: float = 0.06
     """Largest offset of the target from the image centre for the grasp, normalised coordinates."""
+    max_grasps: float = math.inf
+    """After this many grasps it tries no other."""
     lost_seconds: float = 0.6
     """Time without sight of the target after which the robot looks for it, s."""

@@ -36,6 +36,8 @@ class Situation:
     """Distance of the target from the image centre, normalised coordinates."""
     blocked: bool
     """Whether something stands in the way of the hand."""
+    grasps: int = 0
+    """Number of grasps so far."""
 
 
 def next_phase(phase: Phase, now: Situation, gains: ServoGains) -> Phase | Stage:
@@ -51,4 +53,5 @@ def next_phase(phase: Phase, now: Situation, gains: ServoGains) -> Phase | Stage
         return Phase.APPROACH if known else Phase.FIXATE
     near = now.distance < gains.grasp_tolerance * gains.desired_distance
     sure = relative_std < gains.grasp_relative_std and now.offset < gains.grasp_centred
-    return Stage.GRASP if near and sure and not now.blocked else Phase.APPROACH
+    may_grasp = not now.blocked and now.grasps < gains.max_grasps
+    return Stage.GRASP if near and sure and may_grasp else Phase.APPROACH

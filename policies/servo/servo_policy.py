@@ -59,6 +59,7 @@ class ServoPolicy:
         self._phase_start = 0.0
         self._last_seen = -math.inf
         self._manoeuvre: Manoeuvre | None = None
+        self._grasps = 0
         self.percept = self.estimate = None
 
     def act(self, obs: Mapping[str, Any]) -> Action:
@@ -130,10 +131,12 @@ class ServoPolicy:
             distance_std=fixation.distance_std_m,
             offset=float(np.linalg.norm(fixation.centroid)),
             blocked=obstacle.evidence > self.gains.obstacle_evidence,
+            grasps=self._grasps,
         )
         phase = next_phase(self._phase, situation, self.gains)
         if isinstance(phase, Stage):
             self._manoeuvre = self._begin(phase, percept, T_base_cam)
+            self._grasps += phase is Stage.GRASP
         elif phase is not self._phase:
             self._phase, self._phase_start = phase, time
 

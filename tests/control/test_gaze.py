@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +64,14 @@ def test_the_target_stays_in_the_centre_whatever_the_translation():
         np.testing.assert_array_equal(twist[:3], v)
         pose = pose @ exp_twist(twist, 0.04)
     assert abs(gaze.roll(pose)) < 0.1
+
+
+def test_without_feed_forward_the_rotation_depends_on_the_offset_alone():
+    gains = replace(GAINS, feed_forward=False)
+    fast, slow = (gaze.fixating_twist(np.array([v, 0.0, v]), np.zeros(2), 0.4, 0.0, gains) for v in (0.1, 0.0))
+    np.testing.assert_array_equal(fast[3:], slow[3:])
+    off = gaze.fixating_twist(np.zeros(3), np.array([0.1, 0.05]), 0.4, 0.0, gains)
+    np.testing.assert_array_equal(off, gaze.fixating_twist(np.zeros(3), np.array([0.1, 0.05]), 0.4, 0.0, GAINS))
 
 
 def test_the_search_turns_at_its_rate_and_moves_nowhere():

@@ -88,4 +88,4 @@ def run_fake_cell(cell: dict[str, Any]) -> dict[str, Any]:
     from fixation_gym.evaluation.rollout import run_episode
 
     result = run_episode(FakeEnv(), FakePolicy(), cell["seed"], scenario=cell["scenario"], policy_name=cell["policy"])
-    return result.to_json()
+    return {**result.to_json(), "trace": result.trace}

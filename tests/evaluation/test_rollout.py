@@ -76,9 +76,9 @@ def test_every_decision_and_the_end_are_filmed() -> None:
     assert [int(frame[0, 0, 0]) for frame in frames] == [0, 40, 80, 120, 160, 200]
 
 
-def test_with_a_stride_fewer_decisions_are_filmed_and_still_the_end() -> None:
+def test_only_the_wanted_decisions_are_filmed_and_still_the_end() -> None:
     frames: list[np.ndarray] = []
-    run_episode(FakeEnv(), FakePolicy(), seed=2, on_frame=frames.append, frame_stride=3)
+    run_episode(FakeEnv(), FakePolicy(), seed=2, on_frame=frames.append, filmed=lambda step: step % 3 == 0)
     assert [int(frame[0, 0, 0]) for frame in frames] == [0, 120, 200]
 
 

@@ -6,7 +6,17 @@ import math
 
 import pytest
 
-from fixation_gym.evaluation.statistics import mean, median, minimum, root_mean_square, wilson_interval
+from fixation_gym.evaluation.statistics import (
+    mcnemar_p,
+    mean,
+    median,
+    median_difference,
+    minimum,
+    paired_difference_interval,
+    quartiles,
+    root_mean_square,
+    wilson_interval,
+)
 
 
 @pytest.mark.parametrize(
@@ -69,3 +79,47 @@ def test_missing_values_are_left_out() -> None:
 def test_a_statistic_of_nothing_is_none(statistic) -> None:
     assert statistic([]) is None
     assert statistic([None, math.nan]) is None
+
+
+@pytest.mark.parametrize(
+    ("first_only", "second_only", "p"),
+    [
+        (0, 0, 1.0),
+        (6, 0, 2 / 64),
+        (1, 5, 14 / 64),  # 2 (1 + 6) / 2^6
+        (3, 3, 1.0),
+    ],
+)
+def test_mcnemar_is_the_two_sided_binomial_test(first_only: int, second_only: int, p: float) -> None:
+    assert mcnemar_p(first_only, second_only) == pytest.approx(p)
+    assert mcnemar_p(second_only, first_only) == pytest.approx(p)
+
+
+def test_the_interval_of_a_paired_difference_is_newcombes() -> None:
+    # By hand: Wilson 48/50 [0.8654, 0.9890] and 38/50 [0.6259, 0.8570], phi = -24 / sqrt(48 2 38 12) = -0.1147.
+    assert paired_difference_interval(36, 12, 2, 0) == pytest.approx((0.0569, 0.3404), abs=1e-3)
+
+
+def test_the_interval_of_a_paired_difference_contains_it_and_changes_sign_with_the_order() -> None:
+    for counts in ((5, 3, 1, 2), (10, 0, 0, 0), (0, 4, 4, 0), (0, 0, 7, 0), (20, 1, 0, 3)):
+        both, first, second, neither = counts
+        low, high = paired_difference_interval(*counts)
+        assert -1.0 <= low <= (first - second) / sum(counts) <= high <= 1.0
+        assert high - low > 0.05
+        assert paired_difference_interval(both, second, first, neither) == pytest.approx((-high, -low))
+    with pytest.raises(ValueError, match="must be counted"):
+        paired_difference_interval(0, 0, 0, 0)
+
+
+def test_the_median_difference_is_of_pairs() -> None:
+    first, second = [10.0, 20.0, 30.0], [9.0, 18.0, 27.0]
+    found = median_difference(first, second)
+    assert found is not None
+    assert found[0] == 2.0
+    assert 1.0 <= found[1] <= 2.0 <= found[2] <= 3.0
+    assert median_difference([1.0], [2.0]) is None
+
+
+def test_quartiles_leave_out_what_is_missing() -> None:
+    assert quartiles([1.0, None, 2.0, math.nan, 3.0]) == (1.5, 2.0, 2.5)
+    assert quartiles([None]) is None

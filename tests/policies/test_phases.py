@@ -6,6 +6,7 @@ import pytest
 from fixation_gym.control.open_loop import Stage
 from policies.servo.gains import ServoGains
 from policies.servo.phases import Phase, Situation, next_phase
+from policies.servo.variants import servo_variant
 
 GAINS = ServoGains()
 READY = Situation(
@@ -37,3 +38,10 @@ READY = Situation(
 )
 def test_every_transition_has_its_condition(phase, change, expected):
     assert next_phase(phase, replace(READY, **change), GAINS) is expected
+
+
+@pytest.mark.parametrize(("grasps", "expected"), [(0, Stage.GRASP), (1, Phase.APPROACH)])
+def test_without_retry_the_second_grasp_does_not_begin(grasps, expected):
+    gains = servo_variant("servo:no_retry").gains
+    assert next_phase(Phase.APPROACH, replace(READY, grasps=grasps), gains) is expected
+    assert next_phase(Phase.APPROACH, replace(READY, grasps=grasps), GAINS) is Stage.GRASP

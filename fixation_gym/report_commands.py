@@ -1,0 +1,102 @@
+"""The commands ``ablate`` and ``report``; see ``cli``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tyro
+
+from fixation_gym.errors import check_names
+from fixation_gym.gl import select_backend
+
+if TYPE_CHECKING:
+    from fixation_gym.evaluation.rollout import EpisodeResult
+
+
+@dataclass(frozen=True)
+class Ablate:
+    """Evaluate the servo and variants that leave something out on the same episodes, and write their report."""
+
+    variant: str = ""
+    """Names of variants, separated by commas; all by default. The full servo always runs."""
+    scenario: str = "clear,opaque,translucent,mirror"
+    """Scenario names, separated by commas."""
+    episodes: int = 20
+    """Episodes per scenario and variant."""
+    seed: int = 0
+    """Chooses the block of episode seeds, as in evaluate."""
+    sensor_noise: str = "nominal"
+    """ideal, nominal or conservative."""
+    image_size: tuple[int, int] = (240, 320)
+    """Height and width of the wrist image, px."""
+    workers: int = 1
+    """Number of processes."""
+    film_failures: bool = False
+    """Run every failed episode again, and keep six moments of it as a picture for the report."""
+    gallery: int = 40
+    """Most failures to show with pictures."""
+    out: Path = Path("out/ablate")
+    """Folder of the report; each variant gets a folder in it. The same command again resumes."""
+
+    def run(self) -> int:
+        """Evaluate and print the table."""
+        from fixation_gym.evaluation.evaluate import EvaluationConfig
+        from policies.servo.variants import VARIANT_NAMES, VARIANTS
+
+        names = split_names(self.variant) if self.variant else VARIANT_NAMES
+        check_names(names, VARIANT_NAMES, "variant")
+        config = EvaluationConfig(
+            scenarios=split_names(self.scenario),
+            episodes=self.episodes,
+            seed=self.seed,
+            sensor_noise=self.sensor_noise,
+            image_size=self.image_size,
+            workers=self.workers,
+        )
+        config.check()
+        select_backend()
+        from fixation_gym.reporting.ablation import ablate, format_ablations
+        from fixation_gym.reporting.report import REPORT_FILE
+
+        chosen = tuple(dict.fromkeys((VARIANT_NAMES[0], *names)))
+        summary, different = ablate(config, chosen, self.out, self.gallery, self.film_failures)
+        print_different(different)
+        print(format_ablations(summary, {variant.name: variant.summary for variant in VARIANTS}))
+        print(f"\n{self.out / REPORT_FILE}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Report:
+    """One HTML page from folders of evaluations: tables with intervals, paired comparisons, paths, failures."""
+
+    folders: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders that evaluate or ablate wrote; the first policy is the reference of comparisons."""
+    gallery: int = 40
+    """Most failures to show with pictures; all are listed."""
+    title: str = "Picking by gaze fixation"
+    """Heading of the page."""
+    out: Path = Path("out/report")
+    """Folder of the page; an earlier report there is replaced."""
+
+    def run(self) -> int:
+        """Write the page and print where it is."""
+        from fixation_gym.reporting.report import REPORT_FILE, write_report
+
+        write_report(self.folders, self.out, self.gallery, self.title)
+        print(self.out / REPORT_FILE)
+        return 0
+
+
+def split_names(text: str) -> tuple[str, ...]:
+    """Split "a,b" into ("a", "b")."""
+    return tuple(name.strip() for name in text.split(","))
+
+
+def print_different(results: Sequence[EpisodeResult]) -> None:
+    """Say which episodes could not be filmed because they came out differently."""
+    for result in results:
+        print(f"{result.scenario} seed {result.seed} came out differently when it was run again: not filmed")

@@ -1,0 +1,1 @@
+"""One self-contained HTML page from the folders that ``evaluate`` and ``ablate`` write."""

@@ -1,0 +1,41 @@
+"""Variants of the servo for ablations: each leaves one thing out. All of them are here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fixation_gym.control.gaze import GazeGains
+from fixation_gym.perception.pipeline import PerceptionSettings
+from policies.servo.gains import ServoGains
+
+
+@dataclass(frozen=True)
+class ServoVariant:
+    """Settings of a servo policy."""
+
+    name: str
+    """Name of the policy."""
+    summary: str
+    """What is left out, in a few words."""
+    gains: ServoGains = field(default_factory=ServoGains)
+    perception: PerceptionSettings = field(default_factory=PerceptionSettings)
+    avoid_obstacles: bool = True
+    """False leaves out the obstacle term."""
+
+
+VARIANTS: tuple[ServoVariant, ...] = (
+    ServoVariant("servo", "nothing left out"),
+    ServoVariant("blind", "no obstacle term", avoid_obstacles=False),
+    ServoVariant(
+        "servo:no_feed_forward",
+        "gaze without feed-forward of the camera's own motion",
+        gains=ServoGains(gaze=GazeGains(feed_forward=False)),
+    ),
+    ServoVariant("servo:no_retry", "one grasp only", gains=ServoGains(max_grasps=1)),
+)
+VARIANT_NAMES = tuple(variant.name for variant in VARIANTS)
+
+
+def servo_variant(name: str) -> ServoVariant:
+    """The variant of that name."""
+    return next(variant for variant in VARIANTS if variant.name == name)
