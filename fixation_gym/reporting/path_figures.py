@@ -83,9 +83,8 @@ def draw_paths(above: Axes, side: Axes, paths: Sequence[tuple[str, str, Trace]],
         for axis, flat in ((above, _from_above), (side, lambda points: _from_side(points, target, sight))):
             camera, tool = flat(trace.camera_m), flat(trace.tool_m)
             axis.plot(*camera.T, ":", color=colour, linewidth=0.9, alpha=0.7)
-            width = (
-                2.8 if index == 0 < len(paths) - 1 else 1.5
-            )  # the same path of another policy must not hide the first
+            wide = index == 0 and len(paths) > 1  # the same path of another policy must not hide the first
+            width = 2.8 if wide else 1.5
             axis.plot(*tool.T, color=colour, linewidth=width, label=label if axis is above else None)
             axis.plot(*tool[0], "o", color=colour, markersize=4, markerfacecolor="white")
             axis.plot(*tool[-1], "s", color=colour, markersize=4)
