@@ -62,7 +62,7 @@ def success_figure(records: Sequence[PolicyRecord], scenarios: Sequence[str]) ->
     _clean(axis)
     axis.plot([], [], "o", color="0.4", label="collision-free success")
     axis.plot([], [], "o", color="0.4", markerfacecolor="white", label="success")
-    figure.legend(loc="outside upper left", ncols=min(6, len(records) + 2), frameon=False, fontsize=9)
+    figure.legend(loc="outside upper left", ncols=min(4, len(records) + 2), frameon=False, fontsize=9)
     return png(figure)
 
 
@@ -85,7 +85,7 @@ def error_figure(records: Sequence[PolicyRecord]) -> bytes | None:
         axis.yaxis.set_major_formatter("{x:g}")
     axes[0].plot([], [], color="0.3", label="median |error|, band: quartiles")
     axes[0].plot([], [], "--", color="0.3", label="median stated std")
-    figure.legend(loc="outside upper left", ncols=min(6, len(known) + 2), frameon=False, fontsize=9)
+    figure.legend(loc="outside upper left", ncols=min(4, len(known) + 2), frameon=False, fontsize=9)
     return png(figure)
 
 

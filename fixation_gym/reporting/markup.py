@@ -100,8 +100,9 @@ def image(data: bytes, kind: str, description: str, plot: bool = True) -> Html:
 
 
 def figure(picture: Html, caption: str) -> Html:
-    """A picture with a line below it."""
-    return Html(f"<figure>{picture}{element('figcaption', caption)}</figure>")
+    """A picture with a line below it, if there is one to say."""
+    line = element("figcaption", caption) if caption else ""
+    return Html(f"<figure>{picture}{line}</figure>")
 
 
 def details(summary: str, content: Html) -> Html:

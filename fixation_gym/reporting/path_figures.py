@@ -78,12 +78,14 @@ def draw_paths(above: Axes, side: Axes, paths: Sequence[tuple[str, str, Trace]],
             above.plot(*_from_above(way).T, "--", color=colour, linewidth=1.0)
             side.plot(*_from_side(way, target, sight).T, "--", color=colour, linewidth=1.0)
 
-    for label, colour, trace in paths:
+    for index, (label, colour, trace) in enumerate(paths):
         row = None if moment is None else min(int(np.searchsorted(trace.time_s, moment - 1e-3)), len(trace.time_s) - 1)
         for axis, flat in ((above, _from_above), (side, lambda points: _from_side(points, target, sight))):
             camera, tool = flat(trace.camera_m), flat(trace.tool_m)
             axis.plot(*camera.T, ":", color=colour, linewidth=0.9, alpha=0.7)
-            axis.plot(*tool.T, color=colour, linewidth=1.5, label=label if axis is above else None)
+            wide = index == 0 and len(paths) > 1  # the same path of another policy must not hide the first
+            width = 2.8 if wide else 1.5
+            axis.plot(*tool.T, color=colour, linewidth=width, label=label if axis is above else None)
             axis.plot(*tool[0], "o", color=colour, markersize=4, markerfacecolor="white")
             axis.plot(*tool[-1], "s", color=colour, markersize=4)
             if row is not None:

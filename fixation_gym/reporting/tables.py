@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from fixation_gym.evaluation.failures import FailureKind
 from fixation_gym.evaluation.rollout import EpisodeResult
-from fixation_gym.evaluation.statistics import mean, quartiles, wilson_interval
+from fixation_gym.evaluation.statistics import median, quartiles, wilson_interval
 from fixation_gym.reporting.comparison import SuccessComparison, ValueComparison, scaled
 from fixation_gym.reporting.digest import PolicyRecord
 from fixation_gym.reporting.markup import Html, element, escaped, joined, table
@@ -50,7 +50,7 @@ def value_table(
 
 def detail_table(records: Sequence[PolicyRecord]) -> Html:
     """What else was measured, over all scenarios."""
-    head = ("policy", "episodes", "collisions", "fixation error px", "mean |error| mm", "error within 2 std", "return")
+    head = ("policy", "episodes", "collisions", "fixation error px", "|error| mm", "error within 2 std", "return")
     rows = []
     for record in records:
         results = record.of(None)
@@ -62,13 +62,15 @@ def detail_table(records: Sequence[PolicyRecord]) -> Html:
                 record.label,
                 str(len(results)),
                 str(sum(result.collision for result in results)),
-                number(mean(result.fixation_rms_px for result in results), 1),
-                number(scaled(mean(result.distance_mae_m for result in results), 1000.0), 1),
+                number(median(result.fixation_rms_px for result in results), 1),
+                number(scaled(median(result.distance_mae_m for result in results), 1000.0), 1),
                 f"{100 * within / decisions:.0f} %" if decisions else NOTHING,
-                number(mean(result.return_ for result in results), 2),
+                number(median(result.return_ for result in results), 2),
             )
         )
-    return table(head, rows, "All scenarios together. Errors while the gaze is held (fixate, approach).")
+    return table(
+        head, rows, "All scenarios together, medians over episodes. Errors while the gaze is held (fixate, approach)."
+    )
 
 
 def comparison_table(comparisons: Sequence[SuccessComparison], caption: str) -> Html:
