@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fixation_gym.control import servo_laws
-from fixation_gym.control.corridor import free_directions
+from fixation_gym.control.corridor import Box, approach_directions, free_directions
+from fixation_gym.envs.object_pool import target_shape
+from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, reachable_directions
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import FloatArray
 from policies.base import Action, Estimate
@@ -17,13 +19,31 @@ from policies.base import Action, Estimate
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_env import FixationPickEnv
 
-_VIEW_DISTANCE, _GRASP_DISTANCE = 0.42, 0.18
+_VIEW_DISTANCE, _GRASP_DISTANCE, _RETREAT_DISTANCE = 0.42, 0.18, 0.30
 _ROUND_SHAPES = ("cylinder", "ball", "ring")
 _CLOSE_SECONDS = 0.8
+_EMPTY_WIDTH = 0.012
+"""Fingers closer than this hold nothing, m."""
+_PALM_ROOM = 0.029
+"""Depth to which a thing fits between the fingers behind the tool's point, m."""
+_FOLDED = 0.36
+"""A camera nearer than this to the base's axis strains the folded arm, m."""
+_STEEP = math.radians(55.0)
+"""Elevation below which an approach is avoided where possible."""
+_FINGER_ROOM = 0.018
+"""Least height of the tool above the table, m."""
+_MOVED = 0.02
+"""A target that is farther than this from where it was aimed at is aimed at anew, m."""
+_NEAR_ANGLE = math.radians(4.0)
+_PHASES = ("fixate", "approach", "grasp", "close", "lift")
 
 
 class OraclePolicy:
-    """Circles the target until a straight approach is free, goes in, grasps, lifts; uses true poses only."""
+    """Circles the target until a straight approach is free, goes in, grasps, lifts; uses true poses only.
+
+    It knows where every obstacle will ever be, but not that the target will be pushed: when the target has moved, or
+    the fingers are empty, it backs off and starts again.
+    """
 
     def __init__(self, env: FixationPickEnv) -> None:
         """Look into ``env``, an unwrapped ``FixationPick-v0``."""
@@ -35,18 +55,16 @@ class OraclePolicy:
         """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
         self._phase = "fixate"
         self._phase_start = 0.0
-        self._direction: FloatArray | None = None
+        self._aim = np.full(3, np.inf)
+        self._direction = np.array([0.0, 0.0, 1.0])
         self._goal = np.zeros(3)
         self.estimate = None
 
     def act(self, obs: Mapping[str, Any]) -> Action:
-        """Action of shape (7,); of the observation only the time is used."""
+        """Action of shape (7,); of the observation only time and gripper width are used."""
         pose = self._env.sim.arm_state().camera_pose
         target = self._env.sim.body_position("target")
-        time = float(obs["time"][0])
-        if self._direction is None:
-            self._direction = self._choose_direction(pose, target)
-        self._advance(pose, target, time)
+        self._advance(pose, target, float(obs["time"][0]), float(obs["gripper_width"][0]))
         if self._phase in ("fixate", "approach"):
             twist = self._fixating_twist(pose, target)
         elif self._phase == "close":
@@ -59,55 +77,112 @@ class OraclePolicy:
         gripper = 1.0 if self._phase in ("close", "lift") else -1.0
         return np.array([*twist / TWIST_LIMITS, gripper], dtype=np.float32)
 
-    def _choose_direction(self, pose: FloatArray, target: FloatArray) -> FloatArray:
-        """Free approach direction nearest to the present one, with as much room as there is."""
-        from fixation_gym.envs.scene import reachable_directions
+    # -- phases --------------------------------------------------------------------------------------------------
 
-        scene = self._env.scene
-        assert scene is not None, "reset the environment before the policy acts"
-        boxes = [obstacle.box for obstacle in scene.obstacles]
+    def _advance(self, pose: FloatArray, target: FloatArray, time: float, width: float) -> None:
+        """Choose the phase in which to act now."""
+        elapsed = time - self._phase_start
+        distance = float(np.linalg.norm(pose[:3, 3] - target))
+        if self._phase in ("fixate", "approach", "grasp") and np.linalg.norm(target - self._aim) > _MOVED:
+            self._aim_at(pose, target, time)
+            if self._phase == "grasp":
+                self._begin("recover", pose, target, time)
+            elif self._angle(pose, target) > _NEAR_ANGLE:
+                self._begin("fixate", pose, target, time)
+            return
+        if self._phase in ("close", "lift") and elapsed > _CLOSE_SECONDS and width < _EMPTY_WIDTH:
+            self._begin("recover", pose, target, time)
+            return
+        arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003
+        done = {
+            "fixate": self._angle(pose, target) < _NEAR_ANGLE or elapsed > 8.0,
+            "approach": distance < _GRASP_DISTANCE * 1.03,
+            "grasp": arrived or elapsed > 4.0,
+            "close": elapsed > _CLOSE_SECONDS,
+            "lift": False,
+            "recover": arrived or elapsed > 3.0,
+        }[self._phase]
+        if done and self._phase == "recover":
+            self._aim_at(pose, target, time)
+            self._begin("fixate", pose, target, time)
+        elif done:
+            self._begin(_PHASES[_PHASES.index(self._phase) + 1], pose, target, time)
+
+    def _begin(self, phase: str, pose: FloatArray, target: FloatArray, time: float) -> None:
+        self._phase, self._phase_start = phase, time
+        if phase == "grasp":
+            point = target - self._back_off(pose[:3, 2]) * pose[:3, 2]
+            point[2] = max(point[2], TABLE_HEIGHT + _FINGER_ROOM)
+            self._goal = point - pose[:3, :3] @ TOOL_IN_CAMERA
+        elif phase == "lift":
+            self._goal = pose[:3, 3] + [0.0, 0.0, 0.16]
+        elif phase == "recover":
+            back = max(0.0, _RETREAT_DISTANCE - float(pose[:3, 2] @ (target - pose[:3, 3])))
+            self._goal = pose[:3, 3] - back * pose[:3, 2]
+
+    def _aim_at(self, pose: FloatArray, target: FloatArray, time: float) -> None:
+        """Choose the free approach direction that is easiest to take up, with as much room as there is."""
         directions = reachable_directions(target)
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
-        order = np.argsort(-directions @ present)
+        from_base = np.linalg.norm((target + _VIEW_DISTANCE * directions)[:, :2], axis=1)
+        strain = 4.0 * np.maximum(0.0, _FOLDED - from_base)
+        flatness = 1.5 * np.maximum(0.0, _STEEP - np.arcsin(directions[:, 2]))  # flat fingers touch the table
+        order = np.argsort(np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + flatness)
+        self._aim, self._direction = target.copy(), directions[order[0]]
+        boxes = self._boxes(time)
         for margin in (0.03, 0.02, 0.01, 0.0):
             free = free_directions(target, boxes, directions[order], margin)
             if free.any():
-                return directions[order][int(np.argmax(free))]
-        return directions[order[0]]
+                self._direction = directions[order][int(np.argmax(free))]
+                return
 
-    def _advance(self, pose: FloatArray, target: FloatArray, time: float) -> None:
-        assert self._direction is not None
+    def _boxes(self, time: float) -> list[Box]:
+        """Boxes around all places where something will be from now on."""
+        boxes = [] if self._scene.distractor is None else [self._scene.distractor.box]
+        for obstacle in self._scene.obstacles:
+            over = obstacle.motion is not None and time > obstacle.motion.end_s
+            boxes += obstacle.boxes[-1:] if over else obstacle.boxes
+        return boxes
+
+    @property
+    def _scene(self) -> SceneSpec:
+        scene = self._env.scene
+        assert scene is not None, "reset the environment before the policy acts"
+        return scene
+
+    def _angle(self, pose: FloatArray, target: FloatArray) -> float:
+        """Angle between the present and the chosen direction, rad."""
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
-        distance = float(np.linalg.norm(pose[:3, 3] - target))
-        elapsed = time - self._phase_start
-        done = {
-            "fixate": float(present @ self._direction) > math.cos(math.radians(4.0)) or elapsed > 8.0,
-            "approach": distance < _GRASP_DISTANCE * 1.03,
-            "grasp": float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003 or elapsed > 4.0,
-            "close": elapsed > _CLOSE_SECONDS,
-            "lift": False,
-        }[self._phase]
-        if not done:
-            return
-        order = ("fixate", "approach", "grasp", "close", "lift")
-        self._phase, self._phase_start = order[order.index(self._phase) + 1], time
-        if self._phase == "grasp":
-            self._goal = target - pose[:3, :3] @ TOOL_IN_CAMERA
-        elif self._phase == "lift":
-            self._goal = pose[:3, 3] + [0.0, 0.0, 0.16]
+        return math.acos(float(np.clip(present @ self._direction, -1.0, 1.0)))
+
+    def _back_off(self, axis: FloatArray) -> float:
+        """How far before the target's centre the tool stops so that the palm does not touch it, m."""
+        spec, rotation = self._scene.target, self._env.sim.data.body("target").xmat.reshape(3, 3)
+        half = np.array(target_shape(spec.shape).half_extent) * spec.scale
+        x, y, z = np.abs(rotation.T @ axis)
+        depth = {
+            "box": half @ [x, y, z],
+            "cylinder": half[0] * math.hypot(x, y) + half[2] * z,
+            "ring": half[0] * math.hypot(x, y) + half[2] * z,
+            "ball": half[0],
+            "duck": 0.0,  # only its body is broad enough to be held; what is above it fits between the fingers
+        }[spec.shape]
+        return float(np.clip(depth - _PALM_ROOM, 0.0, 0.02))
+
+    # -- motions -------------------------------------------------------------------------------------------------
 
     def _waypoint(self, pose: FloatArray) -> FloatArray:
         """In the grasp, first in line with the approach axis, then forward."""
-        if self._phase == "lift":
+        if self._phase != "grasp":
             return self._goal
         return servo_laws.funnel_waypoint(pose, self._goal, slope=2.0, length=0.06)
 
     def _fixating_twist(self, pose: FloatArray, target: FloatArray) -> FloatArray:
-        assert self._direction is not None
         point = pose[:3, :3].T @ (target - pose[:3, 3])
         centroid, depth = point[:2] / point[2], float(point[2])
         desired = _VIEW_DISTANCE if self._phase == "fixate" else _GRASP_DISTANCE
-        offset = pose[:3, :3].T @ (target + depth * self._direction - pose[:3, 3])
+        towards = self._next_direction(pose, target) if self._phase == "fixate" else self._direction
+        offset = pose[:3, :3].T @ (target + depth * towards - pose[:3, 3])
         lateral = 3.0 * offset[:2]
         lateral *= min(1.0, 0.13 / max(float(np.linalg.norm(lateral)), 1e-9))
         forward = float(np.clip(1.5 * (depth - desired), -0.10, 0.10))
@@ -116,11 +191,19 @@ class OraclePolicy:
         w = servo_laws.gaze_rotation(centroid, 4.0, 1.0 / depth, v, roll)
         return np.array([*v, *w, roll])
 
+    def _next_direction(self, pose: FloatArray, target: FloatArray) -> FloatArray:
+        """Direction to go to on the way to the chosen one: up first, down last, around in between."""
+        present = pose[:3, 3] - target
+        height = math.atan2(present[2], math.hypot(present[0], present[1]))
+        wanted = math.asin(float(np.clip(self._direction[2], -1.0, 1.0)))
+        if wanted < height + math.radians(8.0):
+            return self._direction
+        azimuth = math.atan2(-present[1], -present[0])
+        return approach_directions(np.array([azimuth]), np.array([wanted]))[0]
+
     def _roll_error(self, pose: FloatArray) -> float:
         """Level for round targets, otherwise across the target's narrow axis, rad."""
-        scene = self._env.scene
-        assert scene is not None
-        if self._phase == "fixate" or scene.target.shape in _ROUND_SHAPES:
+        if self._phase == "fixate" or self._scene.target.shape in _ROUND_SHAPES:
             level = math.atan2(pose[2, 0], -pose[2, 1])
             return level * float(np.hypot(pose[2, 0], pose[2, 1]))
         matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)

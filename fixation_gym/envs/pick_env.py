@@ -12,7 +12,8 @@ from gymnasium import spaces
 
 from fixation_gym.envs import config, rewards, sensors
 from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
-from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, sample_scene
+from fixation_gym.envs.sampling import sample_scene
+from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
 from fixation_gym.perception.drawing import draw_overlay

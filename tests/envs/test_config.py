@@ -5,7 +5,8 @@ import pytest
 
 from fixation_gym.envs.config import SCENARIOS, resolve_scenario, resolve_sensor_noise
 from fixation_gym.envs.object_pool import obstacle_shape, target_shape
-from fixation_gym.envs.scene import TABLE_HEIGHT, reachable_directions, sample_scene
+from fixation_gym.envs.sampling import sample_scene
+from fixation_gym.envs.scene import TABLE_HEIGHT, reachable_directions
 
 
 def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
