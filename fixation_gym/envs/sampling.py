@@ -1,6 +1,7 @@
 """Sampling of scenes: something hinders the straight approach, yet some approach is free.
 
-Pure: one generator in, one value out. A scene is proposed part by part and rejected as a whole, so every part is drawn as if the others were not there.
+Pure: one generator in, one value out. A scene is proposed part by part and rejected as a whole, so every part is drawn
+as if the others were not there.
 """
 
 from __future__ import annotations
