@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 _VIEW_DISTANCE, _GRASP_DISTANCE, _RETREAT_DISTANCE = 0.42, 0.18, 0.30
 _ROUND_SHAPES = ("cylinder", "ball", "ring")
 _CLOSE_SECONDS = 0.8
-_EMPTY_WIDTH = 0.012
-"""Fingers closer than this hold nothing, m."""
+_HELD = 0.045
+"""A target whose centre is farther than this from the tool's point is not held, m."""
 _PALM_ROOM = 0.029
 """Depth to which a thing fits between the fingers behind the tool's point, m."""
 _FOLDED = 0.36
 """A camera nearer than this to the base's axis strains the folded arm, m."""
-_STEEP = math.radians(55.0)
-"""Elevation below which an approach is avoided where possible."""
-_FINGER_ROOM = 0.018
-"""Least height of the tool above the table, m."""
+_STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
+"""Elevation below which an approach is avoided where possible, for round targets and for those the hand turns to."""
+_FINGERS = np.array([0.050, 0.011, 0.010])
+"""How far the open fingers reach beyond the tool's point along x, y and z of the camera, m."""
 _MOVED = 0.02
 """A target that is farther than this from where it was aimed at is aimed at anew, m."""
 _NEAR_ANGLE = math.radians(4.0)
@@ -42,7 +42,7 @@ class OraclePolicy:
     """Circles the target until a straight approach is free, goes in, grasps, lifts; uses true poses only.
 
     It knows where every obstacle will ever be, but not that the target will be pushed: when the target has moved, or
-    the fingers are empty, it backs off and starts again.
+    the hand is empty, it backs off and starts again.
     """
 
     def __init__(self, env: FixationPickEnv) -> None:
@@ -61,10 +61,10 @@ class OraclePolicy:
         self.estimate = None
 
     def act(self, obs: Mapping[str, Any]) -> Action:
-        """Action of shape (7,); of the observation only time and gripper width are used."""
+        """Action of shape (7,); of the observation only the time is used."""
         pose = self._env.sim.arm_state().camera_pose
         target = self._env.sim.body_position("target")
-        self._advance(pose, target, float(obs["time"][0]), float(obs["gripper_width"][0]))
+        self._advance(pose, target, float(obs["time"][0]))
         if self._phase in ("fixate", "approach"):
             twist = self._fixating_twist(pose, target)
         elif self._phase == "close":
@@ -79,7 +79,7 @@ class OraclePolicy:
 
     # -- phases --------------------------------------------------------------------------------------------------
 
-    def _advance(self, pose: FloatArray, target: FloatArray, time: float, width: float) -> None:
+    def _advance(self, pose: FloatArray, target: FloatArray, time: float) -> None:
         """Choose the phase in which to act now."""
         elapsed = time - self._phase_start
         distance = float(np.linalg.norm(pose[:3, 3] - target))
@@ -90,7 +90,8 @@ class OraclePolicy:
             elif self._angle(pose, target) > _NEAR_ANGLE:
                 self._begin("fixate", pose, target, time)
             return
-        if self._phase in ("close", "lift") and elapsed > _CLOSE_SECONDS and width < _EMPTY_WIDTH:
+        held = np.linalg.norm(target - self._env.sim.tool_position()) < _HELD
+        if self._phase in ("close", "lift") and elapsed > _CLOSE_SECONDS and not held:
             self._begin("recover", pose, target, time)
             return
         arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003
@@ -111,9 +112,7 @@ class OraclePolicy:
     def _begin(self, phase: str, pose: FloatArray, target: FloatArray, time: float) -> None:
         self._phase, self._phase_start = phase, time
         if phase == "grasp":
-            point = target - self._back_off(pose[:3, 2]) * pose[:3, 2]
-            point[2] = max(point[2], TABLE_HEIGHT + _FINGER_ROOM)
-            self._goal = point - pose[:3, :3] @ TOOL_IN_CAMERA
+            self._goal = self._grasp_point(pose, target) - pose[:3, :3] @ TOOL_IN_CAMERA
         elif phase == "lift":
             self._goal = pose[:3, 3] + [0.0, 0.0, 0.16]
         elif phase == "recover":
@@ -126,7 +125,8 @@ class OraclePolicy:
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
         from_base = np.linalg.norm((target + _VIEW_DISTANCE * directions)[:, :2], axis=1)
         strain = 4.0 * np.maximum(0.0, _FOLDED - from_base)
-        flatness = 1.5 * np.maximum(0.0, _STEEP - np.arcsin(directions[:, 2]))  # flat fingers touch the table
+        steep = _STEEP if self._scene.target.shape in _ROUND_SHAPES else _STEEP_TURNED
+        flatness = 1.5 * np.maximum(0.0, steep - np.arcsin(directions[:, 2]))  # flat fingers touch the table
         order = np.argsort(np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + flatness)
         self._aim, self._direction = target.copy(), directions[order[0]]
         boxes = self._boxes(time)
@@ -154,6 +154,14 @@ class OraclePolicy:
         """Angle between the present and the chosen direction, rad."""
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
         return math.acos(float(np.clip(present @ self._direction, -1.0, 1.0)))
+
+    def _grasp_point(self, pose: FloatArray, target: FloatArray) -> FloatArray:
+        """Where the tool goes, shape (3,), in base: to the target's centre, but neither palm nor fingers touch."""
+        point = target - self._back_off(pose[:3, 2]) * pose[:3, 2]
+        lowest = TABLE_HEIGHT + 0.002 + float(np.abs(pose[2, :3]) @ _FINGERS)
+        highest = 2.0 * float(target[2]) - TABLE_HEIGHT - 0.006  # just below the top of what stands on the table
+        point[2] = max(point[2], min(lowest, highest))
+        return point
 
     def _back_off(self, axis: FloatArray) -> float:
         """How far before the target's centre the tool stops so that the palm does not touch it, m."""

@@ -22,6 +22,9 @@ _RATE = 40.0
 """Rate at which deviations decay, critically damped, 1/s."""
 _HOLD_SECONDS = 0.3
 """Time for which a pushed object is held at the end, so that it rests there and no ball rolls on, s."""
+_HOVER = 0.001
+"""Height above the table at which objects are moved, m. Without weight, MuJoCo's convex routine may find a cylinder
+that just touches the table's box to be deep inside it."""
 _MOVED_BEFORE = 0.005
 """A push does not happen to an object that was taken from its place by more than this, m: it may be in the gripper."""
 
@@ -47,6 +50,7 @@ class Mover:
         self._velocity, self._spin = (data.qvel[velocity + a : velocity + b] for a, b in ((0, 3), (3, 6)))
         self._wrench = data.xfrc_applied[body_id]
         self._start, self._start_attitude = self._place.copy(), self._attitude.copy()
+        self._hovering = self._start + np.array([0.0, 0.0, _HOVER])
         self._mass, self._inertia = float(model.body_mass[body_id]), model.body_inertia[body_id].copy()
         self._weight = -self._mass * model.opt.gravity
         self._until = motion.end_s + _HOLD_SECONDS
@@ -69,7 +73,7 @@ class Mover:
             self._wrench[:] = 0.0
             return
         offset, velocity = planned(self.motion, time)
-        lag = self._start - self._place
+        lag = self._hovering - self._place
         lag[:2] += offset
         slower = -self._velocity
         slower[:2] += velocity
