@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fixation_gym.control import servo_laws
-from fixation_gym.control.corridor import Box, approach_directions, free_directions
+from fixation_gym.control.corridor import Box, approach_directions, free_directions, level_axes
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, reachable_directions
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
@@ -18,6 +19,8 @@ from policies.base import Action, Estimate
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_env import FixationPickEnv
+
+IntArray = NDArray[np.int64]
 
 _VIEW_DISTANCE, _GRASP_DISTANCE, _RETREAT_DISTANCE = 0.42, 0.18, 0.30
 _ROUND_SHAPES = ("cylinder", "ball", "ring")
@@ -56,7 +59,7 @@ class OraclePolicy:
         self._phase = "fixate"
         self._phase_start = 0.0
         self._aim = np.full(3, np.inf)
-        self._direction = np.array([0.0, 0.0, 1.0])
+        self._direction, self._grip = np.array([0.0, 0.0, 1.0]), -1
         self._goal = np.zeros(3)
         self.estimate = None
 
@@ -120,21 +123,40 @@ class OraclePolicy:
             self._goal = pose[:3, 3] - back * pose[:3, 2]
 
     def _aim_at(self, pose: FloatArray, target: FloatArray, time: float) -> None:
-        """Choose the free approach direction that is easiest to take up, with as much room as there is."""
-        directions = reachable_directions(target)
+        """Choose the free approach that is easiest to take up, with as much room as there is."""
+        directions = np.repeat(reachable_directions(target), len(self._grips), axis=0)
+        grips = np.resize(self._grips, len(directions))
+        rolls = self._rolls(directions, grips)
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
         from_base = np.linalg.norm((target + _VIEW_DISTANCE * directions)[:, :2], axis=1)
-        strain = 4.0 * np.maximum(0.0, _FOLDED - from_base)
-        steep = _STEEP if self._scene.target.shape in _ROUND_SHAPES else _STEEP_TURNED
-        flatness = 1.5 * np.maximum(0.0, steep - np.arcsin(directions[:, 2]))  # flat fingers touch the table
-        order = np.argsort(np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + flatness)
-        self._aim, self._direction = target.copy(), directions[order[0]]
+        strain = 4.0 * np.maximum(0.0, _FOLDED - from_base) + 0.3 * np.abs(rolls)
+        flatness = np.maximum(0.0, np.where(grips < 0, _STEEP, _STEEP_TURNED) - np.arcsin(directions[:, 2]))
+        # Flat fingers touch the table, so flatness costs more than the way.
+        cost = np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + 1.5 * flatness
         boxes = self._boxes(time)
         for margin in (0.03, 0.02, 0.01, 0.0):
-            free = free_directions(target, boxes, directions[order], margin)
+            free = free_directions(target, boxes, directions, margin, rolls)
             if free.any():
-                self._direction = directions[order][int(np.argmax(free))]
-                return
+                cost = np.where(free, cost, np.inf)
+                break
+        best = int(np.argmin(cost))
+        self._aim, self._direction, self._grip = target.copy(), directions[best], int(grips[best])
+
+    @property
+    def _grips(self) -> IntArray:
+        """Axes of the target along which the fingers close on it, shape (n,); -1: all are alike, the hand stays level.
+
+        Both sides of a box fit between the fingers.
+        """
+        shape = self._scene.target.shape
+        return np.array([-1] if shape in _ROUND_SHAPES else [1, 0] if shape == "box" else [1])
+
+    def _rolls(self, directions: FloatArray, grips: IntArray) -> FloatArray:
+        """How far the hand turns about each direction for a grip, shape (n,), rad."""
+        axes = level_axes(directions)
+        matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)
+        across = np.einsum("nij,nj->ni", axes, matrix.T[np.maximum(grips, 0)])
+        return np.where(grips < 0, 0.0, _half_turn(np.arctan2(across[:, 1], across[:, 0])))
 
     def _boxes(self, time: float) -> list[Box]:
         """Boxes around all places where something will be from now on."""
@@ -210,10 +232,15 @@ class OraclePolicy:
         return approach_directions(np.array([azimuth]), np.array([wanted]))[0]
 
     def _roll_error(self, pose: FloatArray) -> float:
-        """Level for round targets, otherwise across the target's narrow axis, rad."""
-        if self._phase == "fixate" or self._scene.target.shape in _ROUND_SHAPES:
+        """Level at first and for round targets, otherwise across the target's chosen axis, rad."""
+        if self._phase == "fixate" or self._grip < 0:
             level = math.atan2(pose[2, 0], -pose[2, 1])
             return level * float(np.hypot(pose[2, 0], pose[2, 1]))
         matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)
-        across = pose[:3, :3].T @ matrix[:, 1]
-        return (math.atan2(across[1], across[0]) + math.pi / 2) % math.pi - math.pi / 2
+        across = pose[:3, :3].T @ matrix[:, self._grip]
+        return float(_half_turn(math.atan2(across[1], across[0])))
+
+
+def _half_turn(angle: Any) -> Any:
+    """Angle or angles, rad, taken to [-pi/2, pi/2): a grip turned by half a turn is the same."""
+    return (angle + math.pi / 2) % math.pi - math.pi / 2
