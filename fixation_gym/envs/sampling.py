@@ -23,6 +23,8 @@ from fixation_gym.envs.scene import (
     TargetSpec,
     reachable_directions,
 )
+from fixation_gym.geometry.rigid import look_at
+from fixation_gym.robot import TOOL_IN_CAMERA
 from fixation_gym.types import FloatArray
 
 _PUSHED_REGION = ((0.46, 0.66), (-0.18, 0.18))
@@ -34,6 +36,8 @@ _CLIMBS = np.radians([0.0, 5.0, 10.0, 15.0])
 """Rises of the hand on its way, as servo policies climb, along all of which the straight approach must be hindered."""
 _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
+_START_ROOM = 0.10
+"""Least distance between the point between the finger tips and obstacles at the start, m; half the hand is 5 cm."""
 _ATTEMPTS = 1000
 
 
@@ -66,7 +70,7 @@ def _propose(scenario: Scenario, rng: np.random.Generator) -> SceneSpec | None:
     obstacles = _sample_obstacles(scenario, target, distractor, camera, rng)
     if obstacles is None or not _is_solvable(target, distractor, obstacles):
         return None
-    if obstacles and not _hinders(target, obstacles, camera):
+    if obstacles and not (_hinders(target, obstacles, camera) and _has_start_room(obstacles, camera, gaze)):
         return None
     light = rng.uniform(-0.5, 0.5, 2)
     return SceneSpec(
@@ -103,6 +107,19 @@ def _hinders(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...], camera: Fl
     azimuth, elevation = math.atan2(-start[1], -start[0]), math.atan2(start[2], math.hypot(start[0], start[1]))
     ways = approach_directions(np.array([azimuth]), np.minimum(elevation + _CLIMBS, math.radians(80.0)))
     return not free_directions(centre, boxes, ways, 0.0).any()
+
+
+def _has_start_room(obstacles: tuple[ObstacleSpec, ...], camera: FloatArray, gaze: FloatArray) -> bool:
+    """Whether the finger tips, while the hand looks around where it starts, are apart from all places of obstacles."""
+    pose = look_at(camera, gaze, np.array([0.0, 0.0, 1.0]))
+    tool = pose[:3, 3] + pose[:3, :3] @ TOOL_IN_CAMERA
+    for box in (box for obstacle in obstacles for box in obstacle.boxes):
+        c, s = math.cos(box.yaw), math.sin(box.yaw)
+        x, y, z = tool - box.centre
+        outside = np.abs([c * x + s * y, c * y - s * x, z]) - box.half_extent
+        if np.linalg.norm(np.maximum(outside, 0.0)) < _START_ROOM:
+            return False
+    return True
 
 
 def _lasting_box(obstacle: ObstacleSpec) -> Box:
