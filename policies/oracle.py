@@ -7,9 +7,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fixation_gym.control import servo_laws
-from fixation_gym.control.corridor import free_directions
+from fixation_gym.control.corridor import Box, approach_directions, free_directions, level_axes
+from fixation_gym.envs.object_pool import target_shape
+from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, reachable_directions
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import FloatArray
 from policies.base import Action, Estimate
@@ -17,13 +20,33 @@ from policies.base import Action, Estimate
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_env import FixationPickEnv
 
-_VIEW_DISTANCE, _GRASP_DISTANCE = 0.42, 0.18
+IntArray = NDArray[np.int64]
+
+_VIEW_DISTANCE, _GRASP_DISTANCE, _RETREAT_DISTANCE = 0.42, 0.18, 0.30
 _ROUND_SHAPES = ("cylinder", "ball", "ring")
 _CLOSE_SECONDS = 0.8
+_HELD = 0.045
+"""A target whose centre is farther than this from the tool's point is not held, m."""
+_PALM_ROOM = 0.029
+"""Depth to which a thing fits between the fingers behind the tool's point, m."""
+_FOLDED = 0.36
+"""A camera nearer than this to the base's axis strains the folded arm, m."""
+_STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
+"""Elevation below which an approach is avoided where possible, for round targets and for those the hand turns to."""
+_FINGERS = np.array([0.050, 0.011, 0.010])
+"""How far the open fingers reach beyond the tool's point along x, y and z of the camera, m."""
+_MOVED = 0.02
+"""A target that is farther than this from where it was aimed at is aimed at anew, m."""
+_NEAR_ANGLE = math.radians(4.0)
+_PHASES = ("fixate", "approach", "grasp", "close", "lift")
 
 
 class OraclePolicy:
-    """Circles the target until a straight approach is free, goes in, grasps, lifts; uses true poses only."""
+    """Circles the target until a straight approach is free, goes in, grasps, lifts; uses true poses only.
+
+    It knows where every obstacle will ever be, but not that the target will be pushed: when the target has moved, or
+    the hand is empty, it backs off and starts again.
+    """
 
     def __init__(self, env: FixationPickEnv) -> None:
         """Look into ``env``, an unwrapped ``FixationPick-v0``."""
@@ -35,7 +58,8 @@ class OraclePolicy:
         """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
         self._phase = "fixate"
         self._phase_start = 0.0
-        self._direction: FloatArray | None = None
+        self._aim = np.full(3, np.inf)
+        self._direction, self._grip = np.array([0.0, 0.0, 1.0]), -1
         self._goal = np.zeros(3)
         self.estimate = None
 
@@ -43,10 +67,7 @@ class OraclePolicy:
         """Action of shape (7,); of the observation only the time is used."""
         pose = self._env.sim.arm_state().camera_pose
         target = self._env.sim.body_position("target")
-        time = float(obs["time"][0])
-        if self._direction is None:
-            self._direction = self._choose_direction(pose, target)
-        self._advance(pose, target, time)
+        self._advance(pose, target, float(obs["time"][0]))
         if self._phase in ("fixate", "approach"):
             twist = self._fixating_twist(pose, target)
         elif self._phase == "close":
@@ -59,55 +80,139 @@ class OraclePolicy:
         gripper = 1.0 if self._phase in ("close", "lift") else -1.0
         return np.array([*twist / TWIST_LIMITS, gripper], dtype=np.float32)
 
-    def _choose_direction(self, pose: FloatArray, target: FloatArray) -> FloatArray:
-        """Free approach direction nearest to the present one, with as much room as there is."""
-        from fixation_gym.envs.scene import reachable_directions
-
-        scene = self._env.scene
-        assert scene is not None, "reset the environment before the policy acts"
-        boxes = [obstacle.box for obstacle in scene.obstacles]
-        directions = reachable_directions(target)
-        present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
-        order = np.argsort(-directions @ present)
-        for margin in (0.03, 0.02, 0.01, 0.0):
-            free = free_directions(target, boxes, directions[order], margin)
-            if free.any():
-                return directions[order][int(np.argmax(free))]
-        return directions[order[0]]
+    # -- phases --------------------------------------------------------------------------------------------------
 
     def _advance(self, pose: FloatArray, target: FloatArray, time: float) -> None:
-        assert self._direction is not None
-        present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
-        distance = float(np.linalg.norm(pose[:3, 3] - target))
+        """Choose the phase in which to act now."""
         elapsed = time - self._phase_start
+        distance = float(np.linalg.norm(pose[:3, 3] - target))
+        if self._phase in ("fixate", "approach", "grasp") and np.linalg.norm(target - self._aim) > _MOVED:
+            self._aim_at(pose, target, time)
+            if self._phase == "grasp":
+                self._begin("recover", pose, target, time)
+            elif self._angle(pose, target) > _NEAR_ANGLE:
+                self._begin("fixate", pose, target, time)
+            return
+        held = np.linalg.norm(target - self._env.sim.tool_position()) < _HELD
+        if self._phase in ("close", "lift") and elapsed > _CLOSE_SECONDS and not held:
+            self._begin("recover", pose, target, time)
+            return
+        arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003
         done = {
-            "fixate": float(present @ self._direction) > math.cos(math.radians(4.0)) or elapsed > 8.0,
+            "fixate": self._angle(pose, target) < _NEAR_ANGLE or elapsed > 8.0,
             "approach": distance < _GRASP_DISTANCE * 1.03,
-            "grasp": float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003 or elapsed > 4.0,
+            "grasp": arrived or elapsed > 4.0,
             "close": elapsed > _CLOSE_SECONDS,
             "lift": False,
+            "recover": arrived or elapsed > 3.0,
         }[self._phase]
-        if not done:
-            return
-        order = ("fixate", "approach", "grasp", "close", "lift")
-        self._phase, self._phase_start = order[order.index(self._phase) + 1], time
-        if self._phase == "grasp":
-            self._goal = target - pose[:3, :3] @ TOOL_IN_CAMERA
-        elif self._phase == "lift":
+        if done and self._phase == "recover":
+            self._aim_at(pose, target, time)
+            self._begin("fixate", pose, target, time)
+        elif done:
+            self._begin(_PHASES[_PHASES.index(self._phase) + 1], pose, target, time)
+
+    def _begin(self, phase: str, pose: FloatArray, target: FloatArray, time: float) -> None:
+        self._phase, self._phase_start = phase, time
+        if phase == "grasp":
+            self._goal = self._grasp_point(pose, target) - pose[:3, :3] @ TOOL_IN_CAMERA
+        elif phase == "lift":
             self._goal = pose[:3, 3] + [0.0, 0.0, 0.16]
+        elif phase == "recover":
+            back = max(0.0, _RETREAT_DISTANCE - float(pose[:3, 2] @ (target - pose[:3, 3])))
+            self._goal = pose[:3, 3] - back * pose[:3, 2]
+
+    def _aim_at(self, pose: FloatArray, target: FloatArray, time: float) -> None:
+        """Choose the free approach that is easiest to take up, with as much room as there is."""
+        directions = np.repeat(reachable_directions(target), len(self._grips), axis=0)
+        grips = np.resize(self._grips, len(directions))
+        rolls = self._rolls(directions, grips)
+        present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
+        from_base = np.linalg.norm((target + _VIEW_DISTANCE * directions)[:, :2], axis=1)
+        strain = 4.0 * np.maximum(0.0, _FOLDED - from_base) + 0.3 * np.abs(rolls)
+        flatness = np.maximum(0.0, np.where(grips < 0, _STEEP, _STEEP_TURNED) - np.arcsin(directions[:, 2]))
+        # Flat fingers touch the table, so flatness costs more than the way.
+        cost = np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + 1.5 * flatness
+        boxes = self._boxes(time)
+        for margin in (0.03, 0.02, 0.01, 0.0):
+            free = free_directions(target, boxes, directions, margin, rolls)
+            if free.any():
+                cost = np.where(free, cost, np.inf)
+                break
+        best = int(np.argmin(cost))
+        self._aim, self._direction, self._grip = target.copy(), directions[best], int(grips[best])
+
+    @property
+    def _grips(self) -> IntArray:
+        """Axes of the target along which the fingers close on it, shape (n,); -1: all are alike, the hand stays level.
+
+        Both sides of a box fit between the fingers.
+        """
+        shape = self._scene.target.shape
+        return np.array([-1] if shape in _ROUND_SHAPES else [1, 0] if shape == "box" else [1])
+
+    def _rolls(self, directions: FloatArray, grips: IntArray) -> FloatArray:
+        """How far the hand turns about each direction for a grip, shape (n,), rad."""
+        axes = level_axes(directions)
+        matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)
+        across = np.einsum("nij,nj->ni", axes, matrix.T[np.maximum(grips, 0)])
+        return np.where(grips < 0, 0.0, _half_turn(np.arctan2(across[:, 1], across[:, 0])))
+
+    def _boxes(self, time: float) -> list[Box]:
+        """Boxes around all places where something will be from now on."""
+        boxes = [] if self._scene.distractor is None else [self._scene.distractor.box]
+        for obstacle in self._scene.obstacles:
+            over = obstacle.motion is not None and time > obstacle.motion.end_s
+            boxes += obstacle.boxes[-1:] if over else obstacle.boxes
+        return boxes
+
+    @property
+    def _scene(self) -> SceneSpec:
+        scene = self._env.scene
+        assert scene is not None, "reset the environment before the policy acts"
+        return scene
+
+    def _angle(self, pose: FloatArray, target: FloatArray) -> float:
+        """Angle between the present and the chosen direction, rad."""
+        present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
+        return math.acos(float(np.clip(present @ self._direction, -1.0, 1.0)))
+
+    def _grasp_point(self, pose: FloatArray, target: FloatArray) -> FloatArray:
+        """Where the tool goes, shape (3,), in base: to the target's centre, but neither palm nor fingers touch."""
+        point = target - self._back_off(pose[:3, 2]) * pose[:3, 2]
+        lowest = TABLE_HEIGHT + 0.002 + float(np.abs(pose[2, :3]) @ _FINGERS)
+        highest = 2.0 * float(target[2]) - TABLE_HEIGHT - 0.006  # just below the top of what stands on the table
+        point[2] = max(point[2], min(lowest, highest))
+        return point
+
+    def _back_off(self, axis: FloatArray) -> float:
+        """How far before the target's centre the tool stops so that the palm does not touch it, m."""
+        spec, rotation = self._scene.target, self._env.sim.data.body("target").xmat.reshape(3, 3)
+        half = np.array(target_shape(spec.shape).half_extent) * spec.scale
+        x, y, z = np.abs(rotation.T @ axis)
+        depth = {
+            "box": half @ [x, y, z],
+            "cylinder": half[0] * math.hypot(x, y) + half[2] * z,
+            "ring": half[0] * math.hypot(x, y) + half[2] * z,
+            "ball": half[0],
+            "duck": 0.0,  # only its body is broad enough to be held; what is above it fits between the fingers
+        }[spec.shape]
+        return float(np.clip(depth - _PALM_ROOM, 0.0, 0.02))
+
+    # -- motions -------------------------------------------------------------------------------------------------
 
     def _waypoint(self, pose: FloatArray) -> FloatArray:
         """In the grasp, first in line with the approach axis, then forward."""
-        if self._phase == "lift":
+        if self._phase != "grasp":
             return self._goal
         return servo_laws.funnel_waypoint(pose, self._goal, slope=2.0, length=0.06)
 
     def _fixating_twist(self, pose: FloatArray, target: FloatArray) -> FloatArray:
-        assert self._direction is not None
         point = pose[:3, :3].T @ (target - pose[:3, 3])
         centroid, depth = point[:2] / point[2], float(point[2])
         desired = _VIEW_DISTANCE if self._phase == "fixate" else _GRASP_DISTANCE
-        offset = pose[:3, :3].T @ (target + depth * self._direction - pose[:3, 3])
+        towards = self._next_direction(pose, target) if self._phase == "fixate" else self._direction
+        offset = pose[:3, :3].T @ (target + depth * towards - pose[:3, 3])
         lateral = 3.0 * offset[:2]
         lateral *= min(1.0, 0.13 / max(float(np.linalg.norm(lateral)), 1e-9))
         forward = float(np.clip(1.5 * (depth - desired), -0.10, 0.10))
@@ -116,13 +221,26 @@ class OraclePolicy:
         w = servo_laws.gaze_rotation(centroid, 4.0, 1.0 / depth, v, roll)
         return np.array([*v, *w, roll])
 
+    def _next_direction(self, pose: FloatArray, target: FloatArray) -> FloatArray:
+        """Direction to go to on the way to the chosen one: up first, down last, around in between."""
+        present = pose[:3, 3] - target
+        height = math.atan2(present[2], math.hypot(present[0], present[1]))
+        wanted = math.asin(float(np.clip(self._direction[2], -1.0, 1.0)))
+        if wanted < height + math.radians(8.0):
+            return self._direction
+        azimuth = math.atan2(-present[1], -present[0])
+        return approach_directions(np.array([azimuth]), np.array([wanted]))[0]
+
     def _roll_error(self, pose: FloatArray) -> float:
-        """Level for round targets, otherwise across the target's narrow axis, rad."""
-        scene = self._env.scene
-        assert scene is not None
-        if self._phase == "fixate" or scene.target.shape in _ROUND_SHAPES:
+        """Level at first and for round targets, otherwise across the target's chosen axis, rad."""
+        if self._phase == "fixate" or self._grip < 0:
             level = math.atan2(pose[2, 0], -pose[2, 1])
             return level * float(np.hypot(pose[2, 0], pose[2, 1]))
         matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)
-        across = pose[:3, :3].T @ matrix[:, 1]
-        return (math.atan2(across[1], across[0]) + math.pi / 2) % math.pi - math.pi / 2
+        across = pose[:3, :3].T @ matrix[:, self._grip]
+        return float(_half_turn(math.atan2(across[1], across[0])))
+
+
+def _half_turn(angle: Any) -> Any:
+    """Angle or angles, rad, taken to [-pi/2, pi/2): a grip turned by half a turn is the same."""
+    return (angle + math.pi / 2) % math.pi - math.pi / 2

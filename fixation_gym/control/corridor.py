@@ -60,7 +60,9 @@ def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatAr
     return np.stack([-np.cos(elevation) * np.cos(azimuth), -np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], -1)
 
 
-def free_directions(target: FloatArray, obstacles: list[Box], directions: FloatArray, margin: float) -> MaskArray:
+def free_directions(
+    target: FloatArray, obstacles: list[Box], directions: FloatArray, margin: float, rolls: FloatArray | None = None
+) -> MaskArray:
     """Tell for each direction whether the hand can come straight in without touching an obstacle.
 
     Args:
@@ -68,13 +70,18 @@ def free_directions(target: FloatArray, obstacles: list[Box], directions: FloatA
         obstacles: boxes around the obstacles.
         directions: unit vectors from target to camera, shape (n, 3), in base.
         margin: extra room around the hand, m.
+        rolls: how far the hand is turned about its approach axis, clockwise seen from it, shape (n,), rad; None: level.
 
     Returns:
         Mask of shape (n,).
     """
     if not obstacles:
         return np.ones(len(directions), dtype=bool)
-    axes = _camera_axes(directions)
+    axes = level_axes(directions)
+    if rolls is not None:
+        c, s = np.cos(rolls)[:, None], np.sin(rolls)[:, None]
+        right, down = axes[:, 0], axes[:, 1]
+        axes = np.stack([c * right + s * down, c * down - s * right, axes[:, 2]], axis=1)
     turns = np.stack([_yaw_matrix(box.yaw) for box in obstacles])
     rotations = axes[:, None] @ turns  # of every box in every camera
     offsets = (np.stack([box.centre for box in obstacles]) - target) @ axes.transpose(0, 2, 1)
@@ -101,7 +108,7 @@ def _centre_and_half(margin: float) -> tuple[FloatArray, FloatArray]:
     return 0.5 * (_BOXES[:, 0] + _BOXES[:, 1]), 0.5 * (_BOXES[:, 1] - _BOXES[:, 0]) + margin
 
 
-def _camera_axes(directions: FloatArray) -> FloatArray:
+def level_axes(directions: FloatArray) -> FloatArray:
     """Rows x (right), y (down), z (forward) of level cameras that look against the directions, shape (n, 3, 3)."""
     x, y, z = -directions.T
     length = np.hypot(x, y)

@@ -21,6 +21,9 @@ COLLISION_FORCE = 1.0
 COLLISION_PUSH = 0.01
 """Distance an obstacle may be pushed by the robot before it is a collision, m."""
 
+OBSTACLE_MOTIONS = ("still", "driven", "pushed")
+"""What an obstacle may do: stand, move to and fro at constant speed, be pushed to another place once."""
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -36,6 +39,24 @@ class Scenario:
     target_shapes: tuple[str, ...] = tuple(shape.name for shape in TARGET_SHAPES)
     grasp_width: tuple[float, float] = (0.025, 0.07)
     """Range of the target's width between the fingers, m."""
+    view_elevation_deg: tuple[float, float] = (40.0, 52.0)
+    """Range of the angle by which the camera first looks down at the target, deg."""
+    through_sight: bool = False
+    """Whether the first line of sight to the target's centre passes through the first obstacle."""
+    obstacle_motions: tuple[str, ...] = ()
+    """Motions to draw from, one of ``OBSTACLE_MOTIONS`` for each obstacle; none: all stand still."""
+    drive_speed: tuple[float, float] = (0.03, 0.10)
+    """Range of the speed of driven obstacles, m/s."""
+    obstacle_push: tuple[float, float] = (0.04, 0.10)
+    """Range of the displacement of pushed obstacles, m."""
+    target_push: tuple[float, float] = (0.03, 0.08)
+    """Range of the displacement of a pushed target, m."""
+    push_time: tuple[float, float] = (2.0, 6.0)
+    """Range of the time since reset at which a push begins, s."""
+    target_moves: float = 0.0
+    """Probability that the target is pushed."""
+    distractor: float = 0.0
+    """Probability of a second object of the target's colour, which stays in its place."""
 
     def __post_init__(self) -> None:
         _require_names("obstacle_kinds", self.obstacle_kinds, OBSTACLE_KINDS)
@@ -43,6 +64,14 @@ class Scenario:
         _require_range("obstacle_count", self.obstacle_count, 0, MAX_OBSTACLES)
         _require_range("grasp_width", self.grasp_width, 0.025, 0.07)
         _require_range("alpha", self.alpha, 0.0, 1.0)
+        _require_range("view_elevation_deg", self.view_elevation_deg, 25.0, 60.0)
+        _require_names("obstacle_motions", self.obstacle_motions, OBSTACLE_MOTIONS)
+        _require_range("drive_speed", self.drive_speed, 0.01, 0.10)
+        _require_range("obstacle_push", self.obstacle_push, 0.0, 0.10)
+        _require_range("target_push", self.target_push, 0.0, 0.08)
+        _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
+        _require_probability("target_moves", self.target_moves)
+        _require_probability("distractor", self.distractor)
         high = self.obstacle_count[1]
         if not all(isinstance(count, int) for count in self.obstacle_count):
             raise ValueError(f"obstacle_count must be two whole numbers, got {self.obstacle_count}")
@@ -71,6 +100,11 @@ def _require_range(field: str, values: tuple[float, float], lowest: float, highe
         raise ValueError(f"{field} must be (low, high) within {lowest}..{highest}, got {values}")
 
 
+def _require_probability(field: str, value: float) -> None:
+    if not isinstance(value, (int, float)) or not 0.0 <= value <= 1.0:
+        raise ValueError(f"{field} must be a number within 0..1, got {value!r}")
+
+
 SCENARIOS: dict[str, Scenario] = {
     scenario.name: scenario
     for scenario in (
@@ -78,6 +112,18 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario("opaque", ("opaque",), (1, 3)),
         Scenario("translucent", ("translucent",), (1, 3)),
         Scenario("mirror", ("mirror",), (1, 1)),
+        Scenario("line_of_sight", ("translucent", "wire"), (1, 2), view_elevation_deg=(28.0, 38.0), through_sight=True),
+        Scenario("moving_obstacle", ("opaque", "translucent"), (1, 2), obstacle_motions=("driven", "pushed")),
+        Scenario("moving_target", target_moves=1.0),
+        Scenario("distractor", distractor=1.0),
+        Scenario(
+            "mixed",
+            OBSTACLE_KINDS,
+            (1, 4),
+            obstacle_motions=("still", "still", "driven", "pushed"),
+            target_moves=0.3,
+            distractor=0.3,
+        ),
     )
 }
 SCENARIO_NAMES = tuple(SCENARIOS)

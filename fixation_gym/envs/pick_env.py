@@ -12,7 +12,8 @@ from gymnasium import spaces
 
 from fixation_gym.envs import config, rewards, sensors
 from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
-from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, sample_scene
+from fixation_gym.envs.sampling import sample_scene
+from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
 from fixation_gym.perception.drawing import draw_overlay
@@ -54,14 +55,15 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     success, -1 for the first collision. The terms are in ``info["reward_terms"]`` and sum to the reward.
 
     **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.50 m away,
-    looking within 9 cm of it. **End** ``terminated`` on success: target 0.1 m above its resting height for 0.5 s.
-    Time-outs are ``truncated`` by the spec's ``max_episode_steps``: 625, which is 25 s at 25 Hz.
+    looking within 9 cm of it; of two red objects the target is the one nearer to the first image's centre.
+    **End** ``terminated`` on success: target 0.1 m above its resting height for 0.5 s. Time-outs are ``truncated`` by
+    the spec's ``max_episode_steps``: 625, which is 25 s at 25 Hz.
 
     **Info** the same keys in ``reset`` and ``step``: ``is_success``, ``success``, ``collision`` (robot-obstacle contact
-    above 1 N, or an obstacle pushed by more than 1 cm, so far in the episode), ``clearance_m`` (between robot and
-    obstacles, at most 0.5), ``distance_true_m``
-    (depth of the target's centre along the optical axis), ``fixation_error_px`` (of that centre from the image
-    centre; NaN behind the camera), ``reward_terms``. True values never reach the observation.
+    above 1 N, or an obstacle pushed off its place or way by more than 1 cm, so far in the episode), ``clearance_m``
+    (between robot and obstacles, at most 0.5), ``distance_true_m`` (depth of the target's centre along the optical
+    axis), ``fixation_error_px`` (of that centre from the image centre; NaN behind the camera), ``reward_terms``. True
+    values never reach the observation.
     """
 
     metadata = {"render_modes": ["rgb_array", "human"], "render_fps": config.CONTROL_FREQUENCY}  # noqa: RUF012

@@ -17,6 +17,8 @@ import numpy as np
 from fixation_gym.control.computed_torque import ArmDynamics, ArmTask, arm_torques, camera_kinematics
 from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
 from fixation_gym.envs import contacts
+from fixation_gym.envs.motion import planned
+from fixation_gym.envs.movers import Mover
 from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, SceneExtension
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.scene_loader import SceneLoader
@@ -82,6 +84,7 @@ class PickSim:
         self._display: tuple[Any, SceneLoader] | None = None
         self._joint_command = np.zeros(7)
         self.obstacles: tuple[str, ...] = ()
+        self._movers: tuple[Mover, ...] = ()
 
     def _view_arm(self) -> ArmDynamics:
         """Views into the simulator's arrays; the arm's joints are the first of the model and form one chain."""
@@ -115,17 +118,22 @@ class PickSim:
             self._display[1].load(scene)
         mujoco.mj_setConst(model, data)
         mujoco.mj_resetData(model, data)
-        for body, (position, yaw) in placed.items():
+        for body, (position, yaw, _) in placed.items():
             address = model.joint(f"{body}_joint").qposadr[0]
             data.qpos[address : address + 3] = self._base_position + position
             data.qpos[address + 3 : address + 7] = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
-        self.obstacles = tuple(body for body in placed if body != "target")
+        self.obstacles = tuple(body for body in placed if body.startswith("obstacle"))
         self._colliding = contacts.colliding_geoms(model, self._compiled.owners)
         start = look_at(np.array(scene.camera_position), np.array(scene.gaze_point), np.array([0.0, 0.0, 1.0]))
         data.qpos[self._fingers] = data.ctrl[7:9] = [0.04, -0.04]
         data.qpos[self._arm] = self._joint_command[:] = self._inverse_kinematics(start)
         mujoco.mj_forward(model, data)
         self._rest = {body: self.body_position(body) for body in placed}
+        moved = {body: motion for body, (_, _, motion) in placed.items() if motion is not None}
+        self._movers = tuple(
+            Mover(model, data, body, motion, spares_taken=body == "target") for body, motion in moved.items()
+        )
+        self._motions = moved
 
     def _inverse_kinematics(self, T_base_cam: FloatArray) -> FloatArray:
         """Joint angles that bring the camera to a pose."""
@@ -163,10 +171,12 @@ class PickSim:
         model, data = self.model, self.data
         finger_step = _GRIPPER_SPEED * model.opt.timestep * float(np.sign(gripper))
         arm, torques, fingers = self._arm_dynamics, data.ctrl[self._arm], data.ctrl[self._fingers]
-        finger = float(fingers[0])
+        finger, movers = float(fingers[0]), self._movers
         collided = False
         exposed = data.qpos.copy()
         for substep in range(1, self.substeps + 1):
+            for mover in movers:
+                mover.apply()
             mujoco.mj_step1(model, data)
             arm_torques(arm, self._task, camera_twist, self._joint_command, torques)
             if finger_step:
@@ -214,9 +224,15 @@ class PickSim:
         return float(self.body_position("target")[2] - self._rest["target"][2])
 
     def obstacle_push(self) -> float:
-        """Largest distance by which an obstacle has left its place, m."""
-        moved = [np.linalg.norm(self.body_position(body) - self._rest[body]) for body in self.obstacles]
-        return float(max(moved, default=0.0))
+        """Largest distance of an obstacle from where it would be without the robot, m."""
+        return max((self._deviation(body) for body in self.obstacles), default=0.0)
+
+    def _deviation(self, body: str) -> float:
+        """Distance of a pool body from its place at reset or, if the scene moves it, from its planned one, m."""
+        deviation = self.body_position(body) - self._rest[body]
+        if body in self._motions:
+            deviation[:2] -= planned(self._motions[body], self.data.time)[0]
+        return float(np.linalg.norm(deviation))
 
     def clearance(self) -> float:
         """Smallest distance between robot and obstacles, m, at most ``contacts.LARGEST_CLEARANCE``."""

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, TARGET_SHAPES, Part, Shape, Vector
-from fixation_gym.envs.scene import ObstacleSpec, SceneSpec
-from fixation_gym.envs.scene_mjcf import HIDDEN_GROUP, VISIBLE_GROUP, part_name
+from fixation_gym.envs.motion import Motion
+from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, TARGET_SHAPES, Part, Shape, Vector, target_shape
+from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
+from fixation_gym.envs.scene_mjcf import HIDDEN_GROUP, RED_BODIES, VISIBLE_GROUP, part_name
 from fixation_gym.types import FloatArray
 
 TARGET_RGBA = (0.80, 0.06, 0.05, 1.0)
@@ -37,6 +38,15 @@ class _PartGeom:
     part: Part
 
 
+class Placement(NamedTuple):
+    """Where a body of the pool belongs."""
+
+    position: Vector
+    """Centre in base, m."""
+    yaw: float
+    motion: Motion | None
+
+
 class SceneLoader:
     """Knows where the pool's parts are in one compiled model. ``model`` is an ``mjModel``."""
 
@@ -47,7 +57,8 @@ class SceneLoader:
         geom_names = {model.geom(i).name: i for i in range(model.ngeom)}
         self._parts: dict[tuple[str, str], list[_PartGeom]] = {}
         slots = sorted({model.body(i).name for i in range(model.nbody) if model.body(i).name.startswith("obstacle")})
-        for body, shapes in [("target", TARGET_SHAPES), *((slot, [s for _, s in obstacle_shapes]) for slot in slots)]:
+        red = [(body, TARGET_SHAPES) for body in RED_BODIES]
+        for body, shapes in [*red, *((slot, [s for _, s in obstacle_shapes]) for slot in slots)]:
             for shape in shapes:
                 names = [part_name(body, shape, i) for i in range(len(shape.parts))]
                 if names[0] in geom_names:
@@ -55,7 +66,8 @@ class SceneLoader:
                         _PartGeom(geom_names[name], model.geom_size[geom_names[name]].copy(), np.array(part.pos), part)
                         for name, part in zip(names, shape.parts, strict=True)
                     ]
-        self._bodies = {name: model.body(name).id for name in ["target", *slots]}
+        self._slots = slots
+        self._bodies = {name: model.body(name).id for name in [*RED_BODIES, *slots]}
         self._materials = {model.mat(i).name: i for i in range(model.nmat)}
         self._mirror_slot = next(body for body, shape in self._parts if shape == "mirror")
         self._table_geom = model.geom("table_visual").id
@@ -65,29 +77,33 @@ class SceneLoader:
         model.body_contype[bodies] = model.body_conaffinity[bodies] = 0  # what its geoms have, together
         self._untouched = {name: getattr(model, name).copy() for name in _WRITTEN_FIELDS}
 
-    def load(self, scene: SceneSpec) -> dict[str, tuple[Vector, float]]:
-        """Write the scene's shapes; returns centre (in the robot base frame, m) and yaw of every body in use."""
+    def load(self, scene: SceneSpec) -> dict[str, Placement]:
+        """Write the scene's shapes; returns where every body in use belongs."""
         model = self._model
         for name, values in self._untouched.items():
             getattr(model, name)[:] = values
         model.geom_matid[self._table_geom] = self._materials[scene.table_texture]
         light = np.array(scene.light_direction)
         model.light_dir[:] = light / np.linalg.norm(light)
-        target = next(shape for shape in TARGET_SHAPES if shape.name == scene.target.shape)
-        self._show("target", target, scene.target.scale)
-        for entry in self._parts["target", target.name]:
-            model.geom_rgba[entry.geom] = TARGET_RGBA
-        placed = {"target": (scene.target.position, scene.target.yaw)}
+        placed = {"target": self._load_red("target", scene.target)}
+        if scene.distractor is not None:
+            placed["distractor"] = self._load_red("distractor", scene.distractor)
         for slot, obstacle in self._assign_slots(scene.obstacles):
             shape = next(s for s in OBSTACLE_SHAPES[obstacle.kind] if s.name == obstacle.shape)
             self._show(slot, shape, (obstacle.scale, obstacle.scale, obstacle.scale))
             self._dress(slot, obstacle)
-            placed[slot] = (obstacle.position, obstacle.yaw)
+            placed[slot] = Placement(obstacle.position, obstacle.yaw, obstacle.motion)
         return placed
+
+    def _load_red(self, body: str, spec: TargetSpec) -> Placement:
+        self._show(body, target_shape(spec.shape), spec.scale)
+        for entry in self._parts[body, spec.shape]:
+            self._model.geom_rgba[entry.geom] = TARGET_RGBA
+        return Placement(spec.position, spec.yaw, spec.motion)
 
     def _assign_slots(self, obstacles: tuple[ObstacleSpec, ...]) -> list[tuple[str, ObstacleSpec]]:
         """The mirror takes the one slot that has a mirror; the others fill the slots in order."""
-        free = [name for name in self._bodies if name != "target"]
+        free = list(self._slots)
         pairs = []
         for obstacle in sorted(obstacles, key=lambda item: item.kind != "mirror"):
             slot = self._mirror_slot if obstacle.kind == "mirror" else free[0]

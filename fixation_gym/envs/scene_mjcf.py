@@ -13,6 +13,8 @@ CAMERA_NAME = "wrist"
 FRONT_CAMERA_NAME = "front"
 VISIBLE_GROUP, STAND_IN_GROUP, ROBOT_GROUP, HIDDEN_GROUP = 1, 3, 4, 5
 """Geom groups: what all cameras see, a coarse robot for mirrors, the robot's looks, unused parts of the pool."""
+RED_BODIES = ("target", "distractor")
+"""Bodies of the pool that take the target's shapes and colour."""
 _OBJECT_FRICTION = "1.0 0.01 0.001"
 
 TEXTURES = {
@@ -63,10 +65,11 @@ def add_wrist_camera(hand: ET.Element) -> None:
 
 
 def add_object_pool(worldbody: ET.Element) -> None:
-    """Add the target body and the obstacle slots, each holding the parts of all shapes it can take."""
-    target = _free_body(worldbody, "target")
-    for shape in TARGET_SHAPES:
-        _add_parts(target, "target", shape)
+    """Add target, distractor and obstacle slots, each a body with the parts of all shapes it can take."""
+    for name in RED_BODIES:
+        body = _free_body(worldbody, name)
+        for shape in TARGET_SHAPES:
+            _add_parts(body, name, shape)
     for slot in range(MAX_OBSTACLES):
         body = _free_body(worldbody, f"obstacle{slot}")
         for kind, shapes in OBSTACLE_SHAPES.items():

@@ -1,11 +1,8 @@
 import json
 
-import numpy as np
 import pytest
 
-from fixation_gym.envs.config import SCENARIOS, resolve_scenario, resolve_sensor_noise
-from fixation_gym.envs.object_pool import obstacle_shape, target_shape
-from fixation_gym.envs.scene import TABLE_HEIGHT, reachable_directions, sample_scene
+from fixation_gym.envs.config import resolve_scenario, resolve_sensor_noise
 
 
 def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
@@ -33,6 +30,11 @@ def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
         ({"alpha": ["a", "b"]}, "two numbers"),
         ({"grasp_width": [0.03]}, "two numbers"),
         ({"grasp_width": [0.01, 0.02]}, "0.025..0.07"),
+        ({"obstacle_motions": ["rolling"]}, "'still', 'driven', 'pushed'"),
+        ({"drive_speed": [0.05, 0.2]}, "0.01..0.1"),
+        ({"obstacle_push": [0.05, 0.2]}, "0.0..0.1"),
+        ({"target_push": [0.05, 0.2]}, "0.0..0.08"),
+        ({"distractor": 2}, "0..1"),
         (7, "name or a mapping"),
     ],
 )
@@ -44,32 +46,3 @@ def test_a_bad_scenario_is_refused_with_what_is_allowed(scenario, message):
 def test_an_unknown_noise_preset_lists_the_presets():
     with pytest.raises(ValueError, match="ideal, nominal, conservative"):
         resolve_sensor_noise("loud")
-
-
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_scenes_stand_on_the_table_apart_from_each_other(name):
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        scene = sample_scene(SCENARIOS[name], rng)
-        target = scene.target
-        low = target.position[2] - target_shape(target.shape).half_extent[2] * target.scale[2]
-        assert low == pytest.approx(TABLE_HEIGHT)
-        assert 0.025 <= 2 * target_shape(target.shape).half_extent[1] * target.scale[1] <= 0.07 + 1e-9
-        assert max(target.scale) <= 1.0
-        count_low, count_high = SCENARIOS[name].obstacle_count
-        assert count_low <= len(scene.obstacles) <= count_high
-        for obstacle in scene.obstacles:
-            half = obstacle_shape(obstacle.kind, obstacle.shape).half_extent[2] * obstacle.scale
-            assert obstacle.position[2] - half == pytest.approx(TABLE_HEIGHT)
-            assert np.linalg.norm(np.subtract(obstacle.position, target.position)[:2]) > 0.07
-
-
-def test_the_same_generator_state_gives_the_same_scene_and_another_another():
-    first, again, other = (sample_scene(SCENARIOS["opaque"], np.random.default_rng(s)) for s in (3, 3, 4))
-    assert first == again
-    assert first != other
-
-
-def test_reachable_directions_look_down_on_the_target():
-    directions = reachable_directions(np.array([0.5, 0.1, -0.08]))
-    assert np.all(directions[:, 2] > 0.5)

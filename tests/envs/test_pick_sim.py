@@ -10,7 +10,7 @@ from fixation_gym.control import computed_torque
 from fixation_gym.control.computed_torque import arm_torques, camera_kinematics
 from fixation_gym.control.resolved_rate import joint_velocities
 from fixation_gym.envs.config import SCENARIOS
-from fixation_gym.envs.scene import sample_scene
+from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.robot import HAND_EYE
 
 pytestmark = pytest.mark.sim

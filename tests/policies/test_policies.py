@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import fixation_gym  # noqa: F401
-from fixation_gym.envs.config import SCENARIO_NAMES
 from policies.baselines import RandomPolicy
 from policies.catalogue import POLICY_NAMES, make_policy
 
@@ -23,7 +22,7 @@ def play(env, policy, seed):
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("scenario", SCENARIO_NAMES)
+@pytest.mark.parametrize("scenario", ["clear", "opaque", "translucent", "mirror"])
 def test_the_servo_picks_without_collision(scenario):
     env = gym.make("FixationPick-v0", scenario=scenario)
     info = play(env, make_policy("servo", env), seed=500_002)
@@ -33,8 +32,9 @@ def test_the_servo_picks_without_collision(scenario):
 
 
 @pytest.mark.sim
-def test_the_oracle_picks_without_collision():
-    env = gym.make("FixationPick-v0", scenario="opaque", image_size=(48, 64))
+@pytest.mark.parametrize("scenario", ["opaque", "moving_obstacle", "moving_target"])
+def test_the_oracle_picks_without_collision(scenario):
+    env = gym.make("FixationPick-v0", scenario=scenario, image_size=None)
     info = play(env, make_policy("oracle", env), seed=500_000)
     env.close()
     assert info["is_success"]

@@ -1,0 +1,215 @@
+"""Sampling of scenes: something hinders the straight approach, yet some approach is free.
+
+Pure: one generator in, one value out. A scene is proposed part by part and rejected as a whole, so every part is drawn
+as if the others were not there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from fixation_gym.control.corridor import Box, approach_directions, free_directions
+from fixation_gym.envs.config import Scenario
+from fixation_gym.envs.object_pool import Vector, target_shape
+from fixation_gym.envs.placement import has_room, sample_obstacle, sample_push
+from fixation_gym.envs.scene import (
+    TABLE_HEIGHT,
+    TARGET_REGION,
+    ObstacleSpec,
+    SceneSpec,
+    TargetSpec,
+    reachable_directions,
+)
+from fixation_gym.geometry.rigid import look_at
+from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.types import FloatArray
+
+_PUSHED_REGION = ((0.46, 0.66), (-0.18, 0.18))
+"""Ranges of x and y in which a push may leave it, in base, m."""
+_CLEARANCE = 0.015
+_LEAST_FREE = 0.2
+"""Least share of the reachable directions that must be free with ``_CLEARANCE`` m to spare."""
+_CLIMBS = np.radians([0.0, 5.0, 10.0, 15.0])
+"""Rises of the hand on its way, as servo policies climb, along all of which the straight approach must be hindered."""
+_DISTRACTOR_DISTANCE = (0.12, 0.22)
+"""Range of the distance between target and distractor, m."""
+_START_ROOM = 0.10
+"""Least distance between the point between the finger tips and obstacles at the start, m; half the hand is 5 cm."""
+_ATTEMPTS = 1000
+
+
+def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
+    """Draw a scene in which something hinders the straight approach, yet some approach is free all the time.
+
+    Raises:
+        RuntimeError: if the scenario's sizes leave no room for such a scene.
+    """
+    for _ in range(_ATTEMPTS):
+        scene = _propose(scenario, rng)
+        if scene is not None:
+            return scene
+    raise RuntimeError(
+        f"no solvable scene found in {_ATTEMPTS} draws for scenario {scenario.name!r}; use fewer obstacles"
+    )
+
+
+def _propose(scenario: Scenario, rng: np.random.Generator) -> SceneSpec | None:
+    target = _sample_target(scenario, rng)
+    centre = np.array(target.position)
+    camera, gaze = _sample_view(scenario, centre, rng)
+    if scenario.target_moves > 0.0 and rng.random() < scenario.target_moves:
+        target = _pushed(target, scenario, rng)
+    distractor = None
+    if scenario.distractor > 0.0 and rng.random() < scenario.distractor:
+        distractor = _sample_distractor(scenario, target, rng)
+        if not _told_apart(target, distractor, camera, gaze):
+            return None
+    obstacles = _sample_obstacles(scenario, target, distractor, camera, rng)
+    if obstacles is None or not _is_solvable(target, distractor, obstacles):
+        return None
+    if obstacles and not (_hinders(target, obstacles, camera) and _has_start_room(obstacles, camera, gaze)):
+        return None
+    light = rng.uniform(-0.5, 0.5, 2)
+    return SceneSpec(
+        target=target,
+        obstacles=obstacles,
+        camera_position=_vector(camera),
+        gaze_point=_vector(gaze),
+        light_direction=(float(light[0]), float(light[1]), -1.0),
+        table_texture=str(rng.choice(("table_wood", "table_plank", "table_felt"))),
+        distractor=distractor,
+    )
+
+
+# -- what a scene must be ------------------------------------------------------------------------------------------
+
+
+def _is_solvable(target: TargetSpec, distractor: TargetSpec | None, obstacles: tuple[ObstacleSpec, ...]) -> bool:
+    """Whether enough directions are free, wherever the target is, of all places where an obstacle ever is."""
+    boxes = [box for obstacle in obstacles for box in obstacle.boxes]
+    if distractor is not None:
+        boxes.append(distractor.box)
+    ends = target.places[[0, -1]] if target.motion else target.places[:1]
+    return all(free_directions(end, boxes, reachable_directions(end), _CLEARANCE).mean() >= _LEAST_FREE for end in ends)
+
+
+def _hinders(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...], camera: FloatArray) -> bool:
+    """Whether the way along the first line of sight is blocked in the end, also for a hand that rises on its way.
+
+    What is driven counts at the middle of its way.
+    """
+    boxes = [_lasting_box(obstacle) for obstacle in obstacles]
+    centre = target.places[-1]
+    start = camera - centre
+    azimuth, elevation = math.atan2(-start[1], -start[0]), math.atan2(start[2], math.hypot(start[0], start[1]))
+    ways = approach_directions(np.array([azimuth]), np.minimum(elevation + _CLIMBS, math.radians(80.0)))
+    return not free_directions(centre, boxes, ways, 0.0).any()
+
+
+def _has_start_room(obstacles: tuple[ObstacleSpec, ...], camera: FloatArray, gaze: FloatArray) -> bool:
+    """Whether the finger tips, while the hand looks around where it starts, are apart from all places of obstacles."""
+    pose = look_at(camera, gaze, np.array([0.0, 0.0, 1.0]))
+    tool = pose[:3, 3] + pose[:3, :3] @ TOOL_IN_CAMERA
+    for box in (box for obstacle in obstacles for box in obstacle.boxes):
+        c, s = math.cos(box.yaw), math.sin(box.yaw)
+        x, y, z = tool - box.centre
+        outside = np.abs([c * x + s * y, c * y - s * x, z]) - box.half_extent
+        if np.linalg.norm(np.maximum(outside, 0.0)) < _START_ROOM:
+            return False
+    return True
+
+
+def _lasting_box(obstacle: ObstacleSpec) -> Box:
+    boxes, motion = obstacle.boxes, obstacle.motion
+    return boxes[len(boxes) // 2] if motion is not None and motion.to_and_fro else boxes[-1]
+
+
+def _told_apart(target: TargetSpec, distractor: TargetSpec, camera: FloatArray, gaze: FloatArray) -> bool:
+    """Whether the target is clearly the one nearer to the image centre, and the straight way to it is free."""
+    axis = (gaze - camera) / np.linalg.norm(gaze - camera)
+    offsets = []
+    for red in (target, distractor):
+        ray = np.array(red.position) - camera
+        offsets.append(float(np.linalg.norm(ray - (ray @ axis) * axis)) / float(ray @ axis))
+    if offsets[1] < 1.5 * offsets[0] + 0.05:
+        return False
+    start = camera - target.position
+    return bool(
+        free_directions(np.array(target.position), [distractor.box], start[None] / np.linalg.norm(start), 0.0)[0]
+    )
+
+
+# -- parts of a scene ----------------------------------------------------------------------------------------------
+
+
+def _sample_target(scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
+    shape = target_shape(str(rng.choice(scenario.target_shapes)))
+    width = rng.uniform(*scenario.grasp_width)
+    ratio = width / (2.0 * shape.half_extent[1])
+    # Thin boxes and cylinders are taller than wide, so that oblique fingers reach them above the table.
+    slender = shape.name in ("box", "cylinder")
+    height_ratio = min(1.0, ratio * rng.uniform(1.0, 1.6)) if slender else ratio
+    length_ratio = min(1.0, ratio * rng.uniform(1.0, 1.3)) if shape.name == "box" else ratio
+    scale = (float(length_ratio), float(ratio), float(height_ratio))
+    x, y = (rng.uniform(*bounds) for bounds in TARGET_REGION)
+    z = TABLE_HEIGHT + shape.half_extent[2] * height_ratio
+    return TargetSpec(shape.name, scale, (float(x), float(y), float(z)), float(rng.uniform(-math.pi, math.pi)))
+
+
+def _sample_view(scenario: Scenario, centre: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Camera position and the point it looks at, both in base."""
+    bearing = math.atan2(centre[1], centre[0])
+    azimuth = bearing + math.radians(rng.uniform(35.0, 60.0))
+    elevation = math.radians(rng.uniform(*scenario.view_elevation_deg))
+    distance = rng.uniform(0.42, 0.50)
+    direction = approach_directions(np.array([azimuth]), np.array([elevation]))[0]
+    gaze_error = rng.uniform(-0.06, 0.06, 3) * [1.0, 1.0, 0.0]
+    return centre + distance * direction, centre + gaze_error
+
+
+def _pushed(target: TargetSpec, scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
+    """The target with a push that leaves it within reach."""
+    while True:
+        motion = sample_push(scenario.target_push, scenario.push_time, rng.uniform(-math.pi, math.pi), rng)
+        end = np.add(target.position[:2], motion.displacement)
+        if all(low < value < high for value, (low, high) in zip(end, _PUSHED_REGION, strict=True)):
+            return replace(target, motion=motion)
+
+
+def _sample_distractor(scenario: Scenario, target: TargetSpec, rng: np.random.Generator) -> TargetSpec:
+    """Another red object, not farther from the target than the hand is wide."""
+    red = _sample_target(scenario, rng)
+    angle, distance = rng.uniform(-math.pi, math.pi), rng.uniform(*_DISTRACTOR_DISTANCE)
+    x, y = target.position[0] + distance * math.cos(angle), target.position[1] + distance * math.sin(angle)
+    return replace(red, position=(float(x), float(y), red.position[2]))
+
+
+def _sample_obstacles(
+    scenario: Scenario,
+    target: TargetSpec,
+    distractor: TargetSpec | None,
+    camera: FloatArray,
+    rng: np.random.Generator,
+) -> tuple[ObstacleSpec, ...] | None:
+    """Obstacles with room for each; None if there is none."""
+    count = int(rng.integers(scenario.obstacle_count[0], scenario.obstacle_count[1] + 1))
+    reds = target.places if distractor is None else np.concatenate([target.places, distractor.places])
+    if distractor is not None and np.linalg.norm(target.places - distractor.position, axis=1).min() < 0.10:
+        return None
+    obstacles: list[ObstacleSpec] = []
+    for index in range(count):
+        kind = str(rng.choice(scenario.obstacle_kinds))
+        if kind == "mirror" and any(obstacle.kind == "mirror" for obstacle in obstacles):
+            return None
+        obstacle = sample_obstacle(scenario, kind, np.array(target.position), camera, index == 0, rng)
+        if obstacle is None or not has_room(obstacle, reds, obstacles):
+            return None
+        obstacles.append(obstacle)
+    return tuple(obstacles)
+
+
+def _vector(values: FloatArray) -> Vector:
+    return (float(values[0]), float(values[1]), float(values[2]))
