@@ -112,6 +112,32 @@ def test_without_an_image_size_the_rest_of_the_observation_is_the_same():
         env.close()
 
 
+@pytest.mark.parametrize("scenario", ["opaque", "translucent", "mirror", "line_of_sight"])
+def test_every_shape_comes_to_rest_within_half_a_second(scenario):
+    # MuJoCo's contacts of a cylinder with a box rattle, and what never rests costs half a physics step.
+    env = gym.make("FixationPick-v0", scenario=scenario, image_size=None).unwrapped
+    for seed in range(8):
+        env.reset(seed=seed)
+        for _ in range(12):
+            env.step(np.zeros(7))
+        assert env.sim.data.ntree_awake == 1, env.scene  # the arm
+    env.close()
+
+
+def test_what_moves_slowly_does_not_stop():
+    env = gym.make("FixationPick-v0", scenario={"target_shapes": ["ball"]}, image_size=None).unwrapped
+    env.reset(seed=0)
+    for _ in range(12):
+        env.step(np.zeros(7))
+    ball, radius = env.sim.data.joint("target_joint"), env.sim.body_position("target")[2]
+    before = env.sim.body_position("target").copy()
+    ball.qvel[0], ball.qvel[4] = 0.01, 0.01 / radius  # rolling along x
+    for _ in range(5):
+        env.step(np.zeros(7))
+    assert env.sim.body_position("target")[0] - before[0] == pytest.approx(0.2 * 0.01, rel=0.2)
+    env.close()
+
+
 def test_resting_objects_sleep_and_wake_at_a_touch():
     env = gym.make("FixationPick-v0", image_size=None).unwrapped
     env.reset(seed=0)
