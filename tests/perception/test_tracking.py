@@ -51,14 +51,15 @@ def look(perception, time, image):
     return perception.update(observation).segmentation
 
 
-def watch(hidden, seconds, moved_at=None):
+def watch(hidden, seconds, moved_at=np.inf):
     """What a perception that follows the two balls sees at last."""
-    perception = Perception(CAMERA)
-    for k in range(round(seconds / 0.04) + 1):
-        time = 0.04 * k
-        moved = np.zeros(3) if moved_at is None else np.array([0.15, 0.0, 0.0]) * np.clip(time - moved_at, 0.0, 0.5)
-        seen = look(perception, time, picture(time, hidden(time), moved))
-    return seen, TARGET + moved
+    perception, last = Perception(CAMERA), round(seconds / 0.04)
+
+    def show(time):
+        moved = np.array([0.15, 0.0, 0.0]) * np.clip(time - moved_at, 0.0, 0.5)
+        return look(perception, time, picture(time, hidden(time), moved)), TARGET + moved
+
+    return [show(0.04 * k) for k in range(last + 1)][-1]
 
 
 def test_at_first_sight_the_smaller_thing_near_the_image_centre_is_the_target():
@@ -86,7 +87,7 @@ def test_a_pushed_target_is_followed_also_if_it_is_hidden_meanwhile(hides):
 def test_the_expected_place_of_a_thing_at_rest_is_exact_for_any_motion():
     first, later = pose_at(0.0), pose_at(1.3)
     seen = segment(picture(0.0), CAMERA, expected=np.zeros(2))
-    depth = first[:3, 2] @ (TARGET - first[:3, 3])
+    depth = float(first[:3, 2] @ (TARGET - first[:3, 3]))
     expected = expected_at(followed(seen, depth, first, 0.0), later, 1.3, SETTINGS)
     truth = image_point(transform(first, depth * np.append(seen.centroid, 1.0)), later)
     assert expected.centroid == pytest.approx(truth, abs=1e-9)
