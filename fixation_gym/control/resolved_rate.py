@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, MaskArray
 
 DAMPING = 0.01
 """Of the least squares: bounds joint speeds near singular postures."""
@@ -52,35 +52,61 @@ def joint_velocities(
         limits: joint limits; speeds beyond them scale the whole motion down, so its direction is kept.
         damping: of the least squares; bounds joint speeds near singular postures.
         posture_gain: rate of the null-space drift, 1/s.
-        limit_gain: a joint nears its limit no faster than this rate times the remaining angle, 1/s.
+        limit_gain: a joint nears its limit no faster than this rate times the remaining angle, 1/s. Where that holds
+            one back, the others make up for it.
 
     Returns:
         Shape (n,), rad/s.
     """
+    joints = len(joint_pos)
+    drift = np.empty(joints)
+    held = np.zeros(joints, np.bool_)
+    velocities = np.zeros(joints)
+    for k in range(joints):
+        drift[k] = posture_gain * (posture[k] - joint_pos[k])
+    for _ in range(joints):
+        _least_squares(jacobian, twist, drift, damping, held, velocities)
+        excess = 1.0
+        for k in range(joints):
+            excess = max(excess, abs(velocities[k]) / limits.speed[k])
+        within = True
+        for k in range(joints):
+            lowest = limit_gain * (limits.lower[k] - joint_pos[k])
+            highest = limit_gain * (limits.upper[k] - joint_pos[k])
+            velocities[k] /= excess
+            if not lowest <= velocities[k] <= highest:
+                velocities[k] = min(max(velocities[k], lowest), highest)
+                within &= bool(held[k])
+                held[k] = True
+        if within:
+            break
+    return velocities
+
+
+@njit(cache=True)
+def _least_squares(
+    jacobian: FloatArray, twist: FloatArray, drift: FloatArray, damping: float, held: MaskArray, velocities: FloatArray
+) -> None:
+    """Set the velocities of all joints that are not held, shape (n,); the others move as they are told."""
     rows, joints = jacobian.shape
     gram = np.empty((rows, rows))
     rest = np.empty(rows)
     for i in range(rows):
         rest[i] = twist[i]
         for k in range(joints):
-            rest[i] -= jacobian[i, k] * posture_gain * (posture[k] - joint_pos[k])
+            rest[i] -= jacobian[i, k] * (velocities[k] if held[k] else drift[k])
         for j in range(i + 1):
             gram[i, j] = damping**2 if i == j else 0.0
             for k in range(joints):
-                gram[i, j] += jacobian[i, k] * jacobian[j, k]
+                if not held[k]:
+                    gram[i, j] += jacobian[i, k] * jacobian[j, k]
     # One solve gives both parts: J^T G^-1 (twist - J drift) + drift.
     _solve_in_place(gram, rest)
-    velocities = np.empty(joints)
-    excess = 1.0
     for k in range(joints):
-        velocities[k] = posture_gain * (posture[k] - joint_pos[k])
-        for i in range(rows):
-            velocities[k] += jacobian[i, k] * rest[i]
-        excess = max(excess, abs(velocities[k]) / limits.speed[k])
-    for k in range(joints):
-        lowest, highest = limit_gain * (limits.lower[k] - joint_pos[k]), limit_gain * (limits.upper[k] - joint_pos[k])
-        velocities[k] = min(max(velocities[k] / excess, lowest), highest)
-    return velocities
+        if not held[k]:
+            velocities[k] = drift[k]
+            for i in range(rows):
+                velocities[k] += jacobian[i, k] * rest[i]
 
 
 @njit(cache=True)

@@ -32,11 +32,11 @@ class MemorySettings:
     """A pixel leaves a point if it is in front with this probability."""
     max_relative_std: float = 0.05
     """... and if its inverse depth is known to this share."""
-    decay_s: float = 10.0
+    decay_s: float = 20.0
     """Time in which evidence fades to 1/e, s."""
     contradiction: float = 0.6
     """Factor on the evidence of a point where the camera now sees something behind it."""
-    saturation: float = 8.0
+    saturation: float = 20.0
     """Largest evidence of a point, in frames."""
     forget_below: float = 0.2
     """Points with less evidence are dropped, in frames."""
@@ -129,7 +129,8 @@ def _seen_through(
         pixels = np.rint(intrinsics.project(points))
         inside = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
     columns, rows = pixels[inside].astype(np.int64).T
-    result[inside] = zero_flow.supported[rows, columns] & (
-        zero_flow.p_nearer[rows, columns] < 1.0 - settings.min_probability
-    )
+    behind = zero_flow.supported & (zero_flow.p_nearer < 1.0 - settings.min_probability)
+    # A point is known to its voxel only, and the background starts at the outline of what it belongs to.
+    other = cv2.dilate((zero_flow.supported & ~behind).view(np.uint8), _NEIGHBOURHOOD).view(np.bool_)
+    result[inside] = (behind & ~other)[rows, columns]
     return result

@@ -27,6 +27,7 @@ from fixation_gym.perception.optic_flow import (
 from fixation_gym.perception.scratch import Float32Array, Scratch
 from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
 from fixation_gym.perception.target_motion import InverseDepth, checked_inverse_depth, target_inverse_depth
+from fixation_gym.perception.tracking import Track, TrackingSettings, expected_at, followed
 from fixation_gym.perception.zero_flow import (
     Gaze,
     ZeroFlow,
@@ -35,7 +36,7 @@ from fixation_gym.perception.zero_flow import (
     widened_on_grid,
     zero_flow_test,
 )
-from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
+from fixation_gym.types import FloatArray, MaskArray, Observation
 
 _OWN_DEPTHS = 5
 """Frames over which the motion of the target's own pixels is believed."""
@@ -47,6 +48,8 @@ class PerceptionSettings:
 
     colour: Colour = RED
     """Colour of the target."""
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    """How far from its expected place the target may be."""
     flow: FlowSettings = field(default_factory=FlowSettings)
     """Resolution, windows and noise of the flow."""
     distance: DistanceSettings = field(default_factory=DistanceSettings)
@@ -124,6 +127,7 @@ class Perception:
         """Forget everything seen."""
         self._frames: deque[_Frame] = deque(maxlen=3)
         self._state: DistanceState | None = None
+        self._track: Track | None = None
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
 
     @property
@@ -139,8 +143,10 @@ class Perception:
         """
         self._check(observation)
         T_base_cam = pose_to_matrix(observation.camera_pose)
-        segmentation = self._segment(observation.rgb, T_base_cam)
+        segmentation = self._segment(observation, T_base_cam)
         fixation = self._follow(observation.time, T_base_cam, segmentation)
+        if segmentation.visible:
+            self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
             self._own_depths.clear()
@@ -162,12 +168,10 @@ class Perception:
             last = self._frames[-1].time
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
 
-    def _segment(self, rgb: ImageArray, T_base_cam: FloatArray) -> Segmentation:
+    def _segment(self, observation: Observation, T_base_cam: FloatArray) -> Segmentation:
         settings = self._settings
-        if self._state is None:
-            return segment(rgb, self._intrinsics, settings.colour)
-        expected = distance.predicted_centroid(self._state, T_base_cam)
-        return segment(rgb, self._intrinsics, settings.colour, expected)
+        expected = expected_at(self._track, T_base_cam, observation.time, settings.tracking)
+        return segment(observation.rgb, self._intrinsics, settings.colour, expected.centroid, expected.reach)
 
     def _follow(self, time: float, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
         """Advance the distance filter to now."""

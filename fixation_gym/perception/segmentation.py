@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -64,7 +65,11 @@ class Segmentation:
 
 
 def segment(
-    rgb: ImageArray, intrinsics: Intrinsics, colour: Colour = RED, expected: FloatArray | None = None
+    rgb: ImageArray,
+    intrinsics: Intrinsics,
+    colour: Colour = RED,
+    expected: FloatArray | None = None,
+    reach: float = math.inf,
 ) -> Segmentation:
     """Segment the target by colour and keep the one group of parts that is largest (and closest to ``expected``).
 
@@ -74,12 +79,13 @@ def segment(
         colour: what counts as target.
         expected: normalised image coordinates, shape (2,), where the target should be; a second object of the same
             colour then wins only if it is much larger. None: the largest group wins.
+        reach: groups whose centroid is farther than this from ``expected`` are something else, normalised coordinates.
     """
     height, width = rgb.shape[:2]
     window = _search_window(rgb, colour)
     if window is None:
         return _not_visible(height, width)
-    part = _largest_group(_colour_mask(rgb, window, colour), colour, intrinsics, window, expected)
+    part = _best_group(_colour_mask(rgb, window, colour), colour, intrinsics, window, expected, reach)
     moments = cv2.moments(part, binaryImage=True)
     area = moments["m00"]
     if area < max(4.0, colour.min_area_fraction * height * width):
@@ -206,12 +212,13 @@ def _colour_tables(colour: Colour) -> tuple[NDArray[np.int32], NDArray[np.int32]
     return least.astype(np.int32), hue_scale.astype(np.int32), in_range.astype(np.int32)
 
 
-def _largest_group(
+def _best_group(
     mask: ImageArray,
     colour: Colour,
     intrinsics: Intrinsics,
     window: tuple[slice, slice],
     expected: FloatArray | None,
+    reach: float,
 ) -> ImageArray:
     """Keep the best group of parts that lie closer together than the merge gap; shape of the window, 0 or 1."""
     step = _group_step(intrinsics.width)
@@ -220,19 +227,23 @@ def _largest_group(
     if step > 1:
         small = cv2.resize(mask * np.uint8(255), None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA)
         present = (small > 0).view(np.uint8)
-    reach = max(3, 2 * round(colour.merge_gap_fraction * columns / 2) + 1)
-    count, labels = cv2.connectedComponents(cv2.dilate(present, _square(reach)))
-    if count <= 2:
+    side = max(3, 2 * round(colour.merge_gap_fraction * columns / 2) + 1)
+    count, labels = cv2.connectedComponents(cv2.dilate(present, _square(side)))
+    if count <= 2 and (expected is None or reach == math.inf):
         return mask
     weight = small.ravel().astype(np.float64) / (255 if step > 1 else 1)
-    area = np.bincount(labels.ravel(), weight, minlength=count)
-    area[0] = 0.0
+    score = np.bincount(labels.ravel(), weight, minlength=count)
+    score[0] = 0.0
     if expected is not None:
         x, y = intrinsics.scaled(rows, columns).grid
         top, left = window[0].start // step, window[1].start // step
         x, y = (axis[top : top + labels.shape[0], left : left + labels.shape[1]] for axis in (x, y))
-        area *= _closeness(labels, weight, (x, y), expected, 0.1 * intrinsics.width / intrinsics.fx)
-    best = (labels == int(np.argmax(area))).astype(np.uint8)
+        offset = _offsets(labels, weight, (x, y), expected)
+        # The closeness falls over a tenth of the image width.
+        score *= (offset <= reach) / (1.0 + (offset * 10.0 * intrinsics.fx / intrinsics.width) ** 4)
+    if not score.any():
+        return np.zeros_like(mask)
+    best = (labels == int(np.argmax(score))).astype(np.uint8)
     height, width = mask.shape
     return mask & cv2.resize(best, (width, height), interpolation=cv2.INTER_NEAREST)
 
@@ -242,17 +253,13 @@ def _square(side: int) -> ImageArray:
     return np.ones((side, side), np.uint8)
 
 
-def _closeness(
-    labels: np.ndarray,
-    weight: FloatArray,
-    grid: tuple[FloatArray, FloatArray],
-    expected: FloatArray,
-    reach: float,
+def _offsets(
+    labels: np.ndarray, weight: FloatArray, grid: tuple[FloatArray, FloatArray], expected: FloatArray
 ) -> FloatArray:
-    """Factor in 0..1 per group, shape (N,): 1 at the expected place, falling over a tenth of the image width."""
+    """Distance of each group's centroid from the expected place, shape (N,), normalised coordinates."""
     x, y = grid
     flat = labels.ravel()
     total = np.maximum(np.bincount(flat, weight), 1e-9)
     dx = np.bincount(flat, weight * x.ravel()) / total - expected[0]
     dy = np.bincount(flat, weight * y.ravel()) / total - expected[1]
-    return 1.0 / (1.0 + ((dx**2 + dy**2) / reach**2) ** 2)
+    return np.hypot(dx, dy)

@@ -19,8 +19,10 @@ class ServoGains:
     """Of grasp, lift and recovery."""
     desired_distance: float = 0.17
     """Z_d, m: from here the grasp is open loop. Nearer, large targets leave the image."""
-    approach_gain: float = 0.12
+    approach_gain: float = 0.18
     """lambda_Z of Eq. 7, m/s."""
+    approach_speed: float = 0.11
+    """Largest speed of the approach, m/s."""
     climb_gain: float = 0.15
     """lambda_dist of Eq. 8: speed upwards per metre of Z_f - Z_d, 1/s; grasps from above need less room."""
     climb_until: float = math.radians(65.0)
@@ -35,8 +37,8 @@ class ServoGains:
     """Share of "up" mixed into the way out, in half hand widths: obstacles stand on the table, none hangs above."""
     obstacle_margin: float = 0.01
     """Room to keep between hand and obstacles, m."""
-    obstacle_evidence: float = 40.0
-    """Evidence in the corridor (points times frames) that stops the approach."""
+    obstacle_evidence: float = 60.0
+    """Evidence in the corridor (points times frames) that stops the approach; less slows it down."""
     retreat_gap: float = 0.08
     """An obstacle nearer than this before the finger tips makes the hand retreat, m."""
     retreat_speed: float = 0.05

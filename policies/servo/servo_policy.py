@@ -161,9 +161,9 @@ class ServoPolicy:
     def _fixating_twist(self, percept: Percept, T_base_cam: FloatArray, obstacle: ObstacleTerm) -> FloatArray:
         """Eqs. 6-8 together."""
         gains, fixation = self.gains, percept.fixation
-        blocked = obstacle.evidence > gains.obstacle_evidence
         approaching = self._phase is Phase.APPROACH
         climb = gains.climb_gain if approaching and gaze.elevation(T_base_cam) < gains.climb_until else 0.0
+        certainty = min(1.0, obstacle.evidence / gains.obstacle_evidence)
         lateral = servo_laws.lateral_velocity(
             fixation.distance_m,
             gains.desired_distance,
@@ -172,17 +172,22 @@ class ServoPolicy:
             gains.cycle_amplitude,
             gains.cycle_rate,
             gains.obstacle_gain,
-            self._shunned_direction(obstacle) if blocked else np.zeros(2),
+            certainty * self._shunned_direction(obstacle),
         )
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
-        forward = 0.0
-        if approaching and not blocked:
-            forward = servo_laws.approach_speed(fixation.distance_m, gains.desired_distance, gains.approach_gain)
-        elif blocked and obstacle.gap < gains.retreat_gap:
-            forward = -gains.retreat_speed
+        v = np.array([*lateral, self._forward_speed(fixation.distance_m, obstacle, certainty)])
         roll_error = self._roll_error(percept, T_base_cam)
-        v = np.array([*lateral, forward])
         return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, gains.gaze)
+
+    def _forward_speed(self, distance: float, obstacle: ObstacleTerm, certainty: float) -> float:
+        """v_Z, m/s: Eq. 7, the slower the surer it is that something is in the way; back off from what is close."""
+        gains = self.gains
+        if certainty == 1.0 and obstacle.gap < gains.retreat_gap:
+            return -gains.retreat_speed
+        if self._phase is not Phase.APPROACH:
+            return 0.0
+        wanted = servo_laws.approach_speed(distance, gains.desired_distance, gains.approach_gain)
+        return min(wanted, gains.approach_speed) * (1.0 - certainty)
 
     def _shunned_direction(self, obstacle: ObstacleTerm) -> FloatArray:
         """obs_xy of unit length; what is straight ahead is passed above."""

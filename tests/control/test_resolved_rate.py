@@ -43,3 +43,11 @@ def test_a_joint_at_its_limit_does_not_go_further(jacobian):
     velocities = joint_velocities(jacobian, np.ones(6), at_limit, np.zeros(7), LIMITS)
     assert velocities[0] <= 0.0
     assert velocities[1] >= 0.0
+
+
+def test_the_other_joints_make_up_for_one_at_its_limit(jacobian):
+    free = joint_velocities(jacobian, np.ones(6) * 0.1, np.zeros(7), np.zeros(7), LIMITS, damping=1e-6)
+    at_limit = 2.0 * np.sign(free) * (np.arange(7) == 3)
+    velocities = joint_velocities(jacobian, np.ones(6) * 0.1, at_limit, at_limit, LIMITS, damping=1e-6)
+    assert velocities[3] == 0.0
+    assert jacobian @ velocities == pytest.approx(np.ones(6) * 0.1, abs=1e-6)
