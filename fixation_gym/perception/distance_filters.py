@@ -103,13 +103,23 @@ def initialise(centroid: FloatArray, T_base_cam: FloatArray, settings: DistanceS
     return DistanceState(np.array(T_base_cam), np.array([*centroid, rho]), np.diag(variances))
 
 
-def predict(state: DistanceState, dt: float, settings: DistanceSettings, visible: bool = True) -> DistanceState:
-    """Let the object walk randomly for ``dt`` s; more so while it is not seen."""
+def predict(
+    state: DistanceState, dt: float, settings: DistanceSettings, visible: bool = True, slide: float = 0.0
+) -> DistanceState:
+    """Let the object walk randomly for ``dt`` s; more so while it is not seen.
+
+    Args:
+        state: estimate before.
+        dt: time to pass, s.
+        settings: random walks.
+        visible: whether the object is seen now.
+        slide: standard deviation of what the centroid moved on the object meanwhile, normalised coordinates.
+    """
     alpha, beta, rho = state.mean.tolist()
     walk = settings.walk_m if visible else settings.lost_walk_m
     # A displacement of the point by 1 m along x, y, z changes (alpha, beta, rho) by rho times (1, 0, 0), (0, 1, 0) and
     # (-alpha, -beta, -rho).
-    q = walk**2 * dt * rho**2
+    q = walk**2 * dt * rho**2 + slide**2
     noise = [
         [q * (1.0 + alpha * alpha), q * alpha * beta, q * alpha * rho],
         [q * alpha * beta, q * (1.0 + beta * beta), q * beta * rho],
@@ -145,7 +155,8 @@ def update(
     if nis > settings.gate:
         rejected = state.rejected + 1
         if rejected >= settings.alarm_count:
-            return _restart(state, centroid, T_base_cam, settings)
+            depth, std, _ = distance_at(state, T_base_cam, settings)
+            return restart(centroid, T_base_cam, depth, math.hypot(std, settings.jump_std_m), settings)
         return replace(state, nis=nis, rejected=rejected)
     for _ in range(2):
         mean, _, gain, jacobian = _gauss_newton_step(view, prior, mean, cov, seen, noise)
@@ -277,16 +288,14 @@ def _ray_std(settings: DistanceSettings, image_std: float, touches_border: bool)
     return math.hypot(*terms)
 
 
-def _restart(
-    state: DistanceState, centroid: FloatArray, T_base_cam: FloatArray, settings: DistanceSettings
+def restart(
+    centroid: FloatArray, T_base_cam: FloatArray, depth: float, std: float, settings: DistanceSettings
 ) -> DistanceState:
-    """Begin anew where the object is seen now; the distance is the old one, give or take the usual jump."""
-    depth, std, _ = distance_at(state, T_base_cam, settings)
+    """Begin anew where the object is seen now, with its depth and standard deviation from elsewhere, m."""
     fresh = initialise(centroid, T_base_cam, settings)
-    rho = 1.0 / depth
-    rho_std = min(np.hypot(std, settings.jump_std_m) * rho**2, settings.initial_relative_std * rho)
+    rho = 1.0 / max(depth, MIN_DEPTH_M)
     cov = fresh.cov.copy()
-    cov[2, 2] = rho_std**2
+    cov[2, 2] = min(std * rho**2, settings.initial_relative_std * rho) ** 2
     return DistanceState(fresh.T_base_anchor, np.array([*centroid, rho]), cov)
 
 

@@ -10,10 +10,11 @@ from functools import lru_cache
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.geometry.rigid import inverse, pose_to_matrix
+from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import distance_filters as distance
 from fixation_gym.perception import kernels
+from fixation_gym.perception.covering import slide
 from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState, Fixation
 from fixation_gym.perception.gradients import FlowSettings
 from fixation_gym.perception.optic_flow import (
@@ -26,7 +27,7 @@ from fixation_gym.perception.optic_flow import (
 )
 from fixation_gym.perception.scratch import Float32Array, Scratch
 from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
-from fixation_gym.perception.target_motion import InverseDepth, checked_inverse_depth, target_inverse_depth
+from fixation_gym.perception.target_motion import InverseDepth, contradiction, target_inverse_depth
 from fixation_gym.perception.tracking import Track, TrackingSettings, expected_at, followed
 from fixation_gym.perception.zero_flow import (
     Gaze,
@@ -144,15 +145,17 @@ class Perception:
         self._check(observation)
         T_base_cam = pose_to_matrix(observation.camera_pose)
         segmentation = self._segment(observation, T_base_cam)
-        fixation = self._follow(observation.time, T_base_cam, segmentation)
-        if segmentation.visible:
-            self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
+        self._follow(observation.time, T_base_cam, segmentation)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
             self._own_depths.clear()
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         self._frames.append(_Frame(observation.time, grey, T_base_cam, segmentation))
-        flow, zero_flow = self._look_for_obstacles()
+        flow = self._flow()
+        zero_flow = self._look_for_obstacles(flow)
+        fixation = self._fixation(T_base_cam, segmentation)
+        if segmentation.visible:
+            self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
         return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam)
 
@@ -173,55 +176,85 @@ class Perception:
         expected = expected_at(self._track, T_base_cam, observation.time, settings.tracking)
         return segment(observation.rgb, self._intrinsics, settings.colour, expected.centroid, expected.reach)
 
-    def _follow(self, time: float, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
+    def _follow(self, time: float, T_base_cam: FloatArray, seen: Segmentation) -> None:
         """Advance the distance filter to now."""
         settings = self._settings.distance
         if self._state is not None:
-            self._state = distance.predict(self._state, time - self._frames[-1].time, settings, seen.visible)
+            before = self._frames[-1]
+            dt = time - before.time
+            depths = [distance.distance_at(self._state, T, settings)[0] for T in (before.T_base_cam, T_base_cam)]
+            slid = slide(before.segmentation, seen, depths[0] / depths[1], dt)
+            self._state = distance.predict(self._state, dt, settings, seen.visible, slid)
         if not seen.visible:
-            return distance.fixation_at(self._state, T_base_cam, settings)
-        mean_variance = 0.5 * float(seen.second_moments[0, 0] + seen.second_moments[1, 1])
+            return
         if self._state is None:
             self._state = distance.initialise(seen.centroid, T_base_cam, settings)
         else:
-            size = math.sqrt(mean_variance)
+            size = math.sqrt(_mean_variance(seen))
             self._state = distance.update(self._state, seen.centroid, T_base_cam, settings, size, seen.touches_border)
-        return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance)
 
-    def _look_for_obstacles(self) -> tuple[Flow, ZeroFlow]:
-        """Flow and zero-flow test at the middle one of the last three frames."""
-        grid = self.flow_intrinsics
-        shape = (grid.height, grid.width)
+    def _fixation(self, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
+        settings = self._settings.distance
+        if not seen.visible:
+            return distance.fixation_at(self._state, T_base_cam, settings)
+        return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, _mean_variance(seen))
+
+    def _inverse_distance(self, T_base_cam: FloatArray) -> InverseDepth:
+        """Of the fixated object for a camera; 0 before it was seen."""
+        if self._state is None:
+            return 0.0, 0.0
+        depth, std, _ = distance.distance_at(self._state, T_base_cam, self._settings.distance)
+        return 1.0 / depth, std / depth**2
+
+    def _flow(self) -> Flow:
+        """Flow at the middle one of the last three frames."""
         if len(self._frames) < 3:
-            time = self._frames[0].time
-            return invalid_flow(time, self._working), unknown_zero_flow(*shape)
+            return invalid_flow(self._frames[0].time, self._working)
         first, middle, last = self._frames
-        settings = self._settings
-        inverse_distance, inverse_std = 0.0, 0.0
-        if self._state is not None:
-            depth, std, _ = distance.distance_at(self._state, middle.T_base_cam, settings.distance)
-            inverse_distance, inverse_std = 1.0 / depth, std / depth**2
+        inverse_distance, _ = self._inverse_distance(middle.T_base_cam)
         outer = (inverse(frame.T_base_cam) @ middle.T_base_cam for frame in (first, last))
         to_first, to_last = (plane_homography(T, inverse_distance, self._working) for T in outer)
-        flow = estimate_flow(
+        return estimate_flow(
             [frame.grey for frame in self._frames],
             [frame.time for frame in self._frames],
             self._working,
             (to_first, to_last),
             inverse_distance,
-            settings.flow,
+            self._settings.flow,
             self._scratch,
         )
+
+    def _look_for_obstacles(self, flow: Flow) -> ZeroFlow:
+        """Zero-flow test where the flow is; mends the distance first if the target's own motion contradicts it."""
+        shape = flow.overlap.shape
+        if not flow.valid:
+            return unknown_zero_flow(*shape)
+        first, middle, last = self._frames
         if not (middle.segmentation.visible and last.segmentation.visible):
             self._own_depths.clear()
-            return flow, unknown_zero_flow(*shape)
+            return unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
         # None takes a place, too: what the motion said long ago is about another distance.
         self._own_depths.append(target_inverse_depth(flow, twist, widened_on_grid(middle.segmentation.mask, shape, 0)))
         recent = [own for own in self._own_depths if own is not None]
-        inverse_distance, inverse_std = checked_inverse_depth((inverse_distance, inverse_std), recent)
-        gaze = Gaze(twist, inverse_distance, inverse_std, middle.segmentation.mask, middle.T_base_cam)
-        return flow, zero_flow_test(flow, gaze, settings.zero_flow, self._self_mask, self.support_height_m)
+        own = contradiction(self._inverse_distance(middle.T_base_cam), recent)
+        if own is not None:
+            self._state = _restarted(own, middle, last, self._settings.distance)
+        gaze = Gaze(twist, *self._inverse_distance(middle.T_base_cam), middle.segmentation.mask, middle.T_base_cam)
+        return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
+
+
+def _mean_variance(seen: Segmentation) -> float:
+    """Of the target's pixels about their centroid, normalised coordinates."""
+    return 0.5 * float(seen.second_moments[0, 0] + seen.second_moments[1, 1])
+
+
+def _restarted(own: InverseDepth, middle: _Frame, last: _Frame, settings: DistanceSettings) -> DistanceState:
+    """The distance filter begun anew in the last frame, with the target's inverse depth in the middle one."""
+    depth = 1.0 / own[0]
+    point = transform(middle.T_base_cam, depth * np.array([*middle.segmentation.centroid, 1.0]))
+    now = float(transform(inverse(last.T_base_cam), point)[2])
+    return distance.restart(last.segmentation.centroid, last.T_base_cam, now, own[1] * depth**2, settings)
 
 
 @lru_cache(maxsize=1)

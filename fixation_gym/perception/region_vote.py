@@ -32,8 +32,6 @@ class VoteSettings:
     """Pixels less sure than this abstain."""
     min_pixels: float = 6.0
     """Least number of votes for either side, px of the flow grid."""
-    outline_weight: float = 0.1
-    """A front vote at an outline counts this much: it may be of what covers the thing."""
     front_share: float = 0.12
     """Least share of the votes that makes a region count as in front."""
     behind_share: float = 0.06
@@ -48,11 +46,10 @@ def region_votes(zero_flow: ZeroFlow, region: MaskArray, settings: VoteSettings)
         region: pixels of the thing, shape (h, w).
         settings: when a pixel votes.
     """
-    p, own, outline = zero_flow.p_nearer[region], zero_flow.moving[region], zero_flow.outline[region]
+    p, own = zero_flow.p_nearer[region], zero_flow.moving[region]
     front = (p > settings.min_probability) | own
     behind = (p < 1.0 - settings.min_probability) & ~own
-    weak = settings.outline_weight * np.count_nonzero(front & outline)
-    return weak + np.count_nonzero(front & ~outline), float(np.count_nonzero(behind))
+    return float(np.count_nonzero(front)), float(np.count_nonzero(behind))
 
 
 def decide(front: float, behind: float, settings: VoteSettings) -> Side:

@@ -22,7 +22,7 @@ from fixation_gym.geometry.interaction import epipolar_direction
 from fixation_gym.perception.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
 from fixation_gym.perception.optic_flow import Flow
 from fixation_gym.perception.pixel_test import PixelAnswers, PixelQuestion, pixel_answers
-from fixation_gym.perception.scratch import Float32Array
+from fixation_gym.perception.scratch import Float32Array, fill
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 
@@ -53,8 +53,8 @@ class ZeroFlow:
     moving: MaskArray
     """Pixels that move off their epipolar line: something moves by itself there, shape (h, w)."""
     outline: MaskArray
-    """Pixels that seem nearer, but lie within a window's reach of something surely behind: they may show either, shape
-    (h, w). An outline belongs to the nearer thing and its motion spreads to both sides."""
+    """Pixels that seem nearer, but lie within a window's reach of something surely behind, shape (h, w). An outline
+    belongs to the nearer thing and its motion spreads to both sides, so these may show either: no evidence."""
     cells: ImageArray
     """The map for policies, shape (32, 32): P(nearer) * 255 where known, 128 elsewhere; moving pixels count as near."""
     inverse_depth: Float32Array
@@ -105,10 +105,12 @@ def zero_flow_test(
     answers = pixel_answers(flow, usable, question)
     outline = _outline(answers, gaze.inverse_distance, settings)
     moving = answers.moving & ~_mixed(answers.moving, outline, settings)
+    # With outlines: for who moves by the map it is better that a thing seems a cell larger than smaller.
     cells = evidence_map(answers.p_nearer, answers.supported, moving, settings)
+    fill(answers.p_nearer, 0.5, outline)
     return ZeroFlow(
         p_nearer=answers.p_nearer,
-        supported=answers.supported,
+        supported=answers.supported & ~outline,
         moving=moving,
         outline=outline,
         cells=cells,

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from test_pipeline_and_zero_flow import CAMERA, POSTERS, TARGET, on_grid, run
@@ -10,7 +11,7 @@ from fixation_gym.geometry.interaction import fixation_coupling, image_flow
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception.dot_product_rule import dot_product_front
 from fixation_gym.perception.region_vote import Side, VoteSettings, decide, region_votes
-from fixation_gym.perception.target_motion import checked_inverse_depth, target_inverse_depth
+from fixation_gym.perception.target_motion import contradiction, target_inverse_depth
 
 
 @pytest.mark.parametrize("v_z", [0.0, 0.05])
@@ -53,13 +54,17 @@ def test_regions_of_the_poster_scene_are_voted_right():
         assert decide(*votes, VoteSettings()) is side
 
 
-def test_outlines_next_to_something_behind_are_marked_and_lie_at_depth_edges():
+def test_outlines_next_to_something_behind_have_no_evidence_and_lie_at_depth_edges():
     _, percept, _, (depth, _, pose) = run(POSTERS, 18)
     fixated = pose[:3, 2] @ (TARGET - pose[:3, 3])
-    zfc = percept.zfc
+    zfc, depth = percept.zfc, on_grid(depth, percept)
     assert 0.01 < zfc.outline.mean() < 0.2
-    wrong = zfc.supported & (zfc.inverse_depth > zfc.fixated_inverse_depth) & (on_grid(depth, percept) > 1.1 * fixated)
-    assert (wrong & zfc.outline).sum() > 0.7 * wrong.sum()
+    assert not (zfc.supported & zfc.outline).any()
+    assert (zfc.p_nearer[zfc.outline] == 0.5).all()
+    front = zfc.supported & (zfc.inverse_depth > zfc.fixated_inverse_depth)
+    assert (front & (depth > 1.1 * fixated)).sum() < 0.05 * front.sum()
+    inner = cv2.erode((depth < 0.9 * fixated).astype(np.uint8), np.ones((7, 7)))
+    assert (zfc.outline & (inner > 0)).sum() < 0.1 * front.sum()
 
 
 def test_the_target_says_its_distance_by_its_own_motion():
@@ -75,12 +80,13 @@ def test_the_target_says_its_distance_by_its_own_motion():
     assert target_inverse_depth(percept.flow, twist, np.zeros(index.shape, bool)[:80, :107]) is None
 
 
-def test_the_distance_from_the_centroid_holds_unless_the_motion_contradicts_it():
-    assert checked_inverse_depth((2.0, 0.02), []) == (2.0, 0.02)
-    assert checked_inverse_depth((2.0, 0.02), [(2.05, 0.05)] * 5) == (2.0, 0.02)
-    assert checked_inverse_depth((3.0, 0.02), [(2.0, 0.05)] * 5) == (2.0, 0.05)
-    assert checked_inverse_depth((3.0, 0.02), [(2.0, 0.05)] * 2) == (3.0, 0.02)
-    assert checked_inverse_depth((3.0, 0.02), [(2.0, 2.0)] * 5) == (3.0, 0.02)
+def test_the_distance_from_the_centroid_holds_unless_the_motion_contradicts_it_or_is_much_surer():
+    assert contradiction((2.0, 0.02), []) is None
+    assert contradiction((2.0, 0.02), [(2.05, 0.05)] * 5) is None
+    assert contradiction((3.0, 0.02), [(2.0, 0.05)] * 5) == (2.0, 0.05)
+    assert contradiction((3.0, 0.02), [(2.0, 0.05)] * 2) is None
+    assert contradiction((3.0, 0.02), [(2.0, 2.0)] * 5) is None
+    assert contradiction((2.0, 0.2), [(2.05, 0.05)] * 5) == (2.05, 0.05)
 
 
 def test_with_the_focus_of_expansion_inside_the_image_its_surroundings_are_unknown_and_nothing_breaks():

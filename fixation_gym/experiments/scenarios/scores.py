@@ -92,11 +92,6 @@ def _edges(depth: FloatArray) -> MaskArray:
     return np.asarray(cv2.dilate(small, kernel) > (1.0 + _EDGE) * cv2.erode(small, kernel))
 
 
-def answered(look: Look) -> MaskArray:
-    """Pixels that have evidence and are not called in front at the outline of something behind, shape (h, w)."""
-    return look.percept.zfc.supported & ~look.percept.zfc.outline
-
-
 def calls(look: Look) -> dict[Rule, MaskArray]:
     """Pixels that each rule calls nearer, shape (h, w); only those that are ``supported`` count."""
     percept = look.percept
@@ -108,7 +103,6 @@ def calls(look: Look) -> dict[Rule, MaskArray]:
 def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
     """Counts per rule; ratios of their sums are the measures."""
     asked = look.percept.zfc.supported & (truth.side != 0.0)
-    own = answered(look) & asked
     front = truth.side > 0.0
     result: dict[str, dict[str, int]] = {}
     for rule, called in calls(look).items():
@@ -120,8 +114,6 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
         result[rule] = {
             "asked": count(asked),
             "right": count(asked & right),
-            "own": count(own),
-            "own_right": count(own & right),
             "inner": count(asked & truth.inner),
             "inner_right": count(asked & truth.inner & right),
             "front": count(asked & front),

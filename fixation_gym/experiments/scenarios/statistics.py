@@ -16,14 +16,13 @@ Run = Mapping[str, Any]
 RULES = ("paper", "exact")
 MEASURES = {
     "sign_accuracy": ("right", "asked"),
-    "sign_accuracy_off_outlines": ("own_right", "own"),
     "inner_sign_accuracy": ("inner_right", "inner"),
     "front_recall": ("front_called", "front"),
     "front_precision": ("front_called", "called"),
     "image_behind": ("image_behind", "image"),
     "inner_image_behind": ("inner_image_behind", "inner_image"),
 }
-"""Ratios of pixel counts summed over the instances: of all pixels with evidence, but for the second."""
+"""Ratios of pixel counts summed over the instances; pixels without evidence do not count."""
 FIRST_CALL_S = 0.5
 _RESAMPLES = 1000
 ALL = "all"
@@ -159,7 +158,7 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 _COLUMNS = (
-    *("sign_accuracy", "sign_accuracy_off_outlines", "inner_sign_accuracy"),
+    *("sign_accuracy", "inner_sign_accuracy"),
     *("front_recall", "front_precision", "inner_image_behind"),
 )
 
