@@ -29,6 +29,8 @@ _RIM = np.ones((5, 5), np.uint8)
 _LEAST_RELATIVE_STD = 0.015
 _SURFACE_SHARE = 0.4
 """Depth between surface and centre, as a share of the target's standard deviation across the line of sight."""
+_LARGEST_RELATIVE_STD = 0.05
+"""Less sure, it may be the motion of what covers the target nearly all."""
 _MUCH_SURER = 2.0
 """What is known this much better replaces what is known worse."""
 _GATE = 3.0
@@ -76,7 +78,9 @@ def contradiction(believed: InverseDepth, recent: Sequence[InverseDepth]) -> Inv
     """
     if len(recent) < _LEAST_RECENT:
         return None
-    value, std = (median(part) for part in zip(*recent, strict=True))
+    values, stds = zip(*recent, strict=True)
+    value, std = median(values), math.hypot(median(stds), 0.5 * (max(values) - min(values)))
+    if std > _LARGEST_RELATIVE_STD * value:
+        return None
     contradicts = abs(value - believed[0]) > _GATE * math.hypot(std, believed[1])
-    surer = _MUCH_SURER * std < believed[1]
-    return (value, std) if (contradicts or surer) and value > 0.0 else None
+    return (value, std) if contradicts or _MUCH_SURER * std < believed[1] else None
