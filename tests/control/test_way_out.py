@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.control.corridor import approach_directions, in_corridor, level_axes
-from fixation_gym.control.gaze import GazeGains
+from fixation_gym.control.gaze import GazeGains, within_reach
 from fixation_gym.control.way_out import way_out
 from fixation_gym.geometry.rigid import look_at
 
@@ -58,9 +58,10 @@ def test_the_way_leads_to_a_free_direction_within_reach(azimuth, height, distanc
     assert GAINS.azimuth_range[0] - 2.0 * STEP < turned < GAINS.azimuth_range[1] + 2.0 * STEP
 
 
-def test_at_the_border_of_the_reach_the_way_leads_back_past_the_obstacle():
+@pytest.mark.parametrize("elevation", [45.0, 60.0, 75.0])
+def test_at_the_border_of_the_reach_the_way_does_not_lead_out_of_it(elevation):
     points, weights = post(70.0, 0.20, 0.20)
-    pose = look_at(TARGET + 0.4 * direction(79.0, 45.0), TARGET, UP)
-    x, y = way_out(points, weights, TARGET, pose, 60.0, 0.005, GAINS)
-    assert x < 0.0  # to the left around the target the azimuth falls
-    assert np.hypot(x, y) == pytest.approx(1.0)
+    pose = look_at(TARGET + 0.4 * direction(81.0, elevation), TARGET, UP)
+    way = way_out(points, weights, TARGET, pose, 60.0, 0.005, GAINS)
+    assert np.linalg.norm(way) == pytest.approx(1.0)
+    assert within_reach(way, pose, TARGET, GAINS) == pytest.approx(way, abs=0.05)
