@@ -70,7 +70,10 @@ class ServoPolicy:
         """Action of ``FixationPick-v0``, shape (7,), for its observation."""
         observation = Observation.from_dict(obs)
         self.percept = self._perception.update(observation)
+        moved_blindly = self._manoeuvre is not None
         command = self.command(self.percept, observation)
+        if moved_blindly and self._manoeuvre is None:
+            self._perception.reset()  # the target was pushed or dropped, so nothing known about it holds
         action = np.concatenate([command.camera_twist / TWIST_LIMITS, [command.gripper]])
         return action.astype(np.float32)
 
