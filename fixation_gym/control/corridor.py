@@ -77,7 +77,11 @@ def free_directions(
     """
     if not obstacles:
         return np.ones(len(directions), dtype=bool)
-    axes = level_axes(directions) if rolls is None else rolled_axes(directions, rolls)
+    axes = level_axes(directions)
+    if rolls is not None:
+        c, s = np.cos(rolls)[:, None], np.sin(rolls)[:, None]
+        right, down = axes[:, 0], axes[:, 1]
+        axes = np.stack([c * right + s * down, c * down - s * right, axes[:, 2]], axis=1)
     turns = np.stack([_yaw_matrix(box.yaw) for box in obstacles])
     rotations = axes[:, None] @ turns  # of every box in every camera
     offsets = (np.stack([box.centre for box in obstacles]) - target) @ axes.transpose(0, 2, 1)
@@ -112,13 +116,6 @@ def level_axes(directions: FloatArray) -> FloatArray:
     down = (-z * right_y, z * right_x, x * right_y - y * right_x)  # forward x right
     rows = (right_x, right_y, np.zeros_like(x), *down, x, y, z)
     return np.stack(rows, axis=1).reshape(-1, 3, 3)
-
-
-def rolled_axes(directions: FloatArray, rolls: FloatArray) -> FloatArray:
-    """As ``level_axes``, of cameras turned clockwise about their optical axes by angles of shape (n,), rad."""
-    right, down, forward = level_axes(directions).swapaxes(0, 1)
-    c, s = np.cos(rolls)[:, None], np.sin(rolls)[:, None]
-    return np.stack([c * right + s * down, c * down - s * right, forward], axis=1)
 
 
 def _yaw_matrix(yaw: float) -> FloatArray:

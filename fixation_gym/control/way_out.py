@@ -10,8 +10,7 @@ import math
 
 import numpy as np
 
-from fixation_gym.control import gaze
-from fixation_gym.control.corridor import approach_directions, in_corridor, rolled_axes
+from fixation_gym.control.corridor import approach_directions, in_corridor, level_axes
 from fixation_gym.control.gaze import GazeGains
 from fixation_gym.types import FloatArray
 
@@ -20,6 +19,8 @@ _AZIMUTHS, _ELEVATIONS = 9, np.radians([45.0, 55.0, 64.0, 73.0, 81.0])
 _STEEP = math.radians(66.0)
 _FLATNESS_COST = 0.5
 """Cost per radian of an elevation below ``_STEEP``: what stands behind a thing is not seen from low down."""
+_CLOSE = math.sin(math.radians(6.0))
+"""Sine of the angle to the best direction below which the motion slows down."""
 _BLOCKED_COST = 1.5
 """Cost of a direction per natural logarithm of its evidence, where that is enough to be sure."""
 
@@ -33,7 +34,7 @@ def way_out(
     margin: float,
     gains: GazeGains,
 ) -> FloatArray:
-    """Direction in which to move the camera around the target, as a lateral unit vector in ``cam``, shape (2,).
+    """Direction in which to move the camera around the target, lateral in ``cam``, shape (2,), of length 1 until close.
 
     Args:
         points: remembered obstacle points in base, shape (n, 3), m.
@@ -47,7 +48,7 @@ def way_out(
     bearing = math.atan2(target[1], target[0])
     azimuths = bearing + np.linspace(*gains.azimuth_range, _AZIMUTHS)
     directions = approach_directions(azimuths, _ELEVATIONS)
-    axes = rolled_axes(directions, np.full(len(directions), gaze.roll(T_base_cam)))
+    axes = level_axes(directions)
     seen = np.einsum("kij,nj->kni", axes, points - target)
     evidence = (in_corridor(seen, margin) & (seen[..., 2] < 0.0)) @ weights
     present = T_base_cam[:3, 3] - target
@@ -56,4 +57,4 @@ def way_out(
     flatness = np.maximum(0.0, _STEEP - np.arcsin(directions[:, 2]))
     cost = angle + _FLATNESS_COST * flatness + _BLOCKED_COST * np.log1p(evidence / full_weight)
     lateral = T_base_cam[:3, :2].T @ directions[int(np.argmin(cost))]
-    return np.asarray(lateral / max(float(np.linalg.norm(lateral)), 1e-6))
+    return np.asarray(lateral / max(float(np.linalg.norm(lateral)), _CLOSE))

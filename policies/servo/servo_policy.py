@@ -13,6 +13,7 @@ from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
 from fixation_gym.control.open_loop import Manoeuvre, Stage
 from fixation_gym.control.way_out import way_out
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
+from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.grasp_axis import narrow_axis
 from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
 from fixation_gym.perception.pipeline import Percept, Perception
@@ -24,6 +25,9 @@ from policies.servo.phases import Phase, Situation, next_phase
 
 _FAR_OFF = 0.5
 """Offset from the image centre beyond which the direction to the target is all that counts, normalised coordinates."""
+
+_ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+"""Twist of a camera that turns about its optical axis, rad/s."""
 
 
 class ServoPolicy:
@@ -193,7 +197,7 @@ class ServoPolicy:
         )
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
         v = np.array([*lateral, self._forward_speed(fixation.distance_m, obstacle, certainty)])
-        roll_error = self._roll_error(percept, T_base_cam)
+        roll_error = self._roll_error(percept, T_base_cam, certainty)
         return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, gains.gaze)
 
     def _forward_speed(self, distance: float, obstacle: ObstacleTerm, certainty: float) -> float:
@@ -213,9 +217,16 @@ class ServoPolicy:
         margin = 2.0 * gains.obstacle_margin
         return way_out(points, evidence, target, T_base_cam, gains.obstacle_evidence, margin, gains.gaze)
 
-    def _roll_error(self, percept: Percept, T_base_cam: FloatArray) -> float:
-        """Angle to turn about the optical axis: level from afar, across the target's narrow axis when near, rad."""
-        gains = self.gains.gaze
-        if percept.fixation.distance_m < gains.align_distance and percept.segmentation.whole:
-            return narrow_axis(percept.segmentation.mask, gaze.roll(T_base_cam), gains.max_roll)
-        return gaze.levelling(T_base_cam, gains)
+    def _roll_error(self, percept: Percept, T_base_cam: FloatArray, certainty: float) -> float:
+        """Angle to turn about the optical axis, rad: level from afar, or if that frees the way of the hand.
+
+        Otherwise across the target's narrow axis.
+        """
+        gains, roll = self.gains.gaze, gaze.roll(T_base_cam)
+        near = percept.fixation.distance_m < gains.align_distance and percept.segmentation.whole
+        if not near or certainty == 1.0:
+            return gaze.levelling(T_base_cam, gains)
+        turn = narrow_axis(percept.segmentation.mask, roll, gains.max_roll)
+        turned = self._obstacle_term(percept, T_base_cam @ exp_twist(_ROLL, turn))
+        blocked = turned.evidence > self.gains.obstacle_evidence
+        return gaze.levelling(T_base_cam, gains) if blocked else turn

