@@ -34,7 +34,7 @@ class GazeGains:
     """The hand is levelled fully while the gaze is off the vertical by more than 1 / ``level_fade`` rad."""
     highest_elevation: float = math.radians(84.0)
     """Elevation of the gaze at which the arm stops rising; beyond the vertical, up and down change places, rad."""
-    azimuth_range: tuple[float, float] = (math.radians(-5.0), math.radians(80.0))
+    azimuth_range: tuple[float, float] = (math.radians(10.0), math.radians(78.0))
     """Azimuths of the gaze, against the direction from base to target, that the arm reaches without strain, rad."""
     search_rate: float = 0.35
     """Turning rate of the search, rad/s."""

@@ -1,8 +1,7 @@
-"""The obstacle term of Eq. 8: where things that hinder the approach are in the image.
+"""What hinders the approach: evidence of obstacles in the volume that the hand sweeps.
 
-The paper takes the centre of mass of all pixels in front of the target. Here only those count that the hand would
-touch on its straight way to the target: evidence is weighed by whether it lies in the corridor that fingers, hand,
-camera and wrist sweep.
+The paper takes all pixels in front of the target. Here only those count that the hand would touch on its straight way
+to the target: evidence is weighed by whether it lies in the corridor that fingers, hand, camera and wrist sweep.
 """
 
 from __future__ import annotations
@@ -14,20 +13,18 @@ import numpy as np
 from fixation_gym.control.corridor import in_corridor
 from fixation_gym.types import FloatArray
 
-_HALF_WIDTH = 0.11
-"""Half width of the hand, m: the unit in which the centre of mass is measured."""
 
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class ObstacleTerm:
     """What stands in the way."""
 
-    centre: FloatArray
-    """obs_xy, shape (2,): centre of mass of the evidence in the corridor, in half hand widths; zero if it is free."""
     evidence: float
     """Evidence in the corridor: number of points, each weighed by how surely it was seen."""
     gap: float
     """Distance along the optical axis from the finger tips to the nearest point in the corridor, m; inf if free."""
+
+
+FREE = ObstacleTerm(0.0, np.inf)
 
 
 def obstacle_term(
@@ -42,11 +39,7 @@ def obstacle_term(
         tool_depth: depth of the finger tips in ``cam``, m.
         margin: room to keep around the hand, m.
     """
-    if not len(points):
-        return ObstacleTerm(np.zeros(2), 0.0, np.inf)
     inside = in_corridor(points - [0.0, 0.0, distance], margin) & (points[:, 2] < distance)
     if not inside.any():
-        return ObstacleTerm(np.zeros(2), 0.0, np.inf)
-    hit, weight = points[inside], weights[inside]
-    centre = weight @ hit[:, :2] / weight.sum() / _HALF_WIDTH
-    return ObstacleTerm(centre, float(weight.sum()), float(hit[:, 2].min() - tool_depth))
+        return FREE
+    return ObstacleTerm(float(weights[inside].sum()), float(points[inside, 2].min() - tool_depth))

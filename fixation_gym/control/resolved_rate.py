@@ -16,6 +16,8 @@ DAMPING = 0.01
 """Of the least squares: bounds joint speeds near singular postures."""
 POSTURE_GAIN = 0.5
 """Rate of the null-space drift, 1/s."""
+_TRANSLATION_WEIGHT = 10.0
+"""Where a joint is held back and the twist cannot be had, 1 cm/s off counts as much as 0.1 rad/s: no hand lunges."""
 LIMIT_GAIN = 5.0
 """A joint nears its limit no faster than this rate times the remaining angle, 1/s."""
 
@@ -91,22 +93,28 @@ def _least_squares(
     rows, joints = jacobian.shape
     gram = np.empty((rows, rows))
     rest = np.empty(rows)
+    weight = np.ones(rows)
+    if held.any():
+        weight[:3] = _TRANSLATION_WEIGHT
     for i in range(rows):
         rest[i] = twist[i]
         for k in range(joints):
             rest[i] -= jacobian[i, k] * (velocities[k] if held[k] else drift[k])
+        rest[i] *= weight[i]
         for j in range(i + 1):
-            gram[i, j] = damping**2 if i == j else 0.0
+            gram[i, j] = 0.0
             for k in range(joints):
                 if not held[k]:
                     gram[i, j] += jacobian[i, k] * jacobian[j, k]
+            gram[i, j] *= weight[i] * weight[j]
+        gram[i, i] += damping**2
     # One solve gives both parts: J^T G^-1 (twist - J drift) + drift.
     _solve_in_place(gram, rest)
     for k in range(joints):
         if not held[k]:
             velocities[k] = drift[k]
             for i in range(rows):
-                velocities[k] += jacobian[i, k] * rest[i]
+                velocities[k] += jacobian[i, k] * weight[i] * rest[i]
 
 
 @njit(cache=True)

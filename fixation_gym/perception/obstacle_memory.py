@@ -1,8 +1,8 @@
 """Short-term memory of things in front: zero-flow evidence of the last seconds, kept where it was seen.
 
 One frame shows only edges that happen to lie across the motion, and what leaves the image is still there. So every
-pixel that is surely in front leaves its 3-D point; points fade within seconds and vanish at once where the camera sees
-through them. Value in, value out.
+pixel that is surely in front leaves its 3-D point; points fade within seconds, sooner in view than out of it, and
+vanish at once where the camera sees through them. Value in, value out.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.perception.zero_flow import ZeroFlow
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, MaskArray
 
 _NEIGHBOURHOOD = np.ones((5, 5), np.uint8)
 """Window of the flow, px of its grid."""
@@ -34,8 +34,12 @@ class MemorySettings:
     """... and if its inverse depth is known to this share."""
     decay_s: float = 20.0
     """Time in which evidence fades to 1/e, s."""
+    decay_in_view_s: float = 5.0
+    """... of points in view: what stands there is seen again and again, what has moved on is not, s."""
     contradiction: float = 0.6
     """Factor on the evidence of a point where the camera now sees something behind it."""
+    contradiction_share: float = 0.08
+    """What is seen is behind a point if its inverse depth is less by this share, and by two standard deviations."""
     saturation: float = 20.0
     """Largest evidence of a point, in frames."""
     forget_below: float = 0.2
@@ -78,10 +82,10 @@ def remember(
         time: of the test, s.
         settings: how evidence is kept.
     """
-    faded = memory.evidence * np.exp(-max(0.0, time - memory.time) / settings.decay_s)
-    faded = faded * np.where(
-        _seen_through(memory, zero_flow, intrinsics, T_base_cam, settings), settings.contradiction, 1.0
-    )
+    in_view, contradicted = _looked_at(memory, zero_flow, intrinsics, T_base_cam, settings)
+    decay_s = np.where(in_view, settings.decay_in_view_s, settings.decay_s)
+    faded = memory.evidence * np.exp(-max(0.0, time - memory.time) / decay_s)
+    faded = faded * np.where(contradicted, settings.contradiction, 1.0)
     seen = _front_points(zero_flow, intrinsics, T_base_cam, settings)
     new_keys = np.unique(np.floor(seen / settings.voxel_m).astype(np.int64), axis=0)
     keys, index = np.unique(np.concatenate([memory.keys, new_keys]), axis=0, return_inverse=True)
@@ -113,24 +117,23 @@ def _front_points(
     return transform(T_base_cam, rays * depth[:, None])
 
 
-def _seen_through(
+def _looked_at(
     memory: ObstacleMemory,
     zero_flow: ZeroFlow,
     intrinsics: Intrinsics,
     T_base_cam: FloatArray,
     settings: MemorySettings,
-) -> NDArray[np.bool_]:
-    """Points at whose pixel the test now sees something clearly behind, shape (n,)."""
-    result = np.zeros(len(memory.keys), dtype=bool)
-    if not len(memory.keys):
-        return result
+) -> tuple[MaskArray, MaskArray]:
+    """Points that are in the image, and those at whose pixel something clearly behind is seen; each of shape (n,)."""
     points = transform(inverse(T_base_cam), (memory.keys + 0.5) * settings.voxel_m)
     with np.errstate(invalid="ignore"):
         pixels = np.rint(intrinsics.project(points))
-        inside = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
-    columns, rows = pixels[inside].astype(np.int64).T
-    behind = zero_flow.supported & (zero_flow.p_nearer < 1.0 - settings.min_probability)
+        in_view = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
+    contradicted = np.zeros(len(points), dtype=np.bool_)
+    columns, rows = pixels[in_view].astype(np.int64).T
+    nearest_possible = zero_flow.inverse_depth + np.float32(2.0) * zero_flow.inverse_depth_std
     # A point is known to its voxel only, and the background starts at the outline of what it belongs to.
-    other = cv2.dilate((zero_flow.supported & ~behind).view(np.uint8), _NEIGHBOURHOOD).view(np.bool_)
-    result[inside] = (behind & ~other)[rows, columns]
-    return result
+    nearest_around = cv2.dilate(np.where(zero_flow.supported, nearest_possible, np.float32(0.0)), _NEIGHBOURHOOD)
+    behind = nearest_around[rows, columns] * points[in_view, 2] < 1.0 - settings.contradiction_share
+    contradicted[in_view] = zero_flow.supported[rows, columns] & behind
+    return in_view, contradicted

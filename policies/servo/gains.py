@@ -32,10 +32,8 @@ class ServoGains:
     cycle_rate: float = 2.0
     """Angular rate of the circle, rad/s."""
     obstacle_gain: float = 0.10
-    """lambda_obs of Eq. 8: speed away from obstacles, m/s."""
-    obstacle_up: float = 1.0
-    """Share of "up" mixed into the way out, in half hand widths: obstacles stand on the table, none hangs above."""
-    obstacle_margin: float = 0.01
+    """lambda_obs of Eq. 8: speed around obstacles, m/s."""
+    obstacle_margin: float = 0.005
     """Room to keep between hand and obstacles, m."""
     obstacle_evidence: float = 60.0
     """Evidence in the corridor (points times frames) that stops the approach; less slows it down."""
@@ -57,3 +55,9 @@ class ServoGains:
     """After this many grasps it tries no other."""
     lost_seconds: float = 0.6
     """Time without sight of the target after which the robot looks for it, s."""
+    search_climb: float = 0.08
+    """Speed at which the search rises around the place where the target should be, to look from above, m/s."""
+    search_distance: float = 0.40
+    """The search backs off to this distance of that place, m."""
+    search_seconds: float = 5.0
+    """After this time the search looks elsewhere, too, s."""

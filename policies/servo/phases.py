@@ -46,7 +46,7 @@ def next_phase(phase: Phase, now: Situation, gains: ServoGains) -> Phase | Stage
     if phase is Phase.SEARCH:
         return Phase.SEARCH if lost else Phase.FIXATE
     if lost:
-        return Stage.RECOVER
+        return Phase.SEARCH
     relative_std = now.distance_std / now.distance
     if phase is Phase.FIXATE:
         known = relative_std < gains.fixate_relative_std and now.phase_seconds > gains.fixate_seconds

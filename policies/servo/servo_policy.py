@@ -11,7 +11,9 @@ import numpy as np
 from fixation_gym.control import gaze, open_loop, servo_laws
 from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
 from fixation_gym.control.open_loop import Manoeuvre, Stage
+from fixation_gym.control.way_out import way_out
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
+from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.grasp_axis import narrow_axis
 from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
 from fixation_gym.perception.pipeline import Percept, Perception
@@ -20,6 +22,12 @@ from fixation_gym.types import Command, FloatArray, Observation
 from policies.base import Action, Estimate
 from policies.servo.gains import ServoGains
 from policies.servo.phases import Phase, Situation, next_phase
+
+_FAR_OFF = 0.5
+"""Offset from the image centre beyond which the direction to the target is all that counts, normalised coordinates."""
+
+_ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+"""Twist of a camera that turns about its optical axis, rad/s."""
 
 
 class ServoPolicy:
@@ -66,7 +74,10 @@ class ServoPolicy:
         """Action of ``FixationPick-v0``, shape (7,), for its observation."""
         observation = Observation.from_dict(obs)
         self.percept = self._perception.update(observation)
+        moved_blindly = self._manoeuvre is not None
         command = self.command(self.percept, observation)
+        if moved_blindly and self._manoeuvre is None:
+            self._perception.reset()  # the target was pushed or dropped, so nothing known about it holds
         action = np.concatenate([command.camera_twist / TWIST_LIMITS, [command.gripper]])
         return action.astype(np.float32)
 
@@ -135,15 +146,13 @@ class ServoPolicy:
         )
         phase = next_phase(self._phase, situation, self.gains)
         if isinstance(phase, Stage):
-            self._manoeuvre = self._begin(phase, percept, T_base_cam)
-            self._grasps += phase is Stage.GRASP
+            self._manoeuvre = self._begin_grasp(percept, T_base_cam)
+            self._grasps += 1
         elif phase is not self._phase:
             self._phase, self._phase_start = phase, time
 
-    def _begin(self, stage: Stage, percept: Percept, T_base_cam: FloatArray) -> Manoeuvre:
+    def _begin_grasp(self, percept: Percept, T_base_cam: FloatArray) -> Manoeuvre:
         gains = self.gains.open_loop
-        if stage is Stage.RECOVER:
-            return open_loop.begin_recovery(T_base_cam, percept.time, gains)
         support = self._perception.support_height_m
         return open_loop.begin_grasp(T_base_cam, percept.fixation.point_base, support, percept.time, gains)
 
@@ -153,10 +162,22 @@ class ServoPolicy:
         if self._manoeuvre is not None:
             twist = open_loop.manoeuvre_twist(self._manoeuvre, T_base_cam, self.gains.open_loop)
         elif self._phase is Phase.SEARCH:
-            twist = gaze.searching_twist(percept.time - self._phase_start, self.gains.gaze)
+            twist = self._searching_twist(percept, T_base_cam)
         else:
             twist = self._fixating_twist(percept, T_base_cam, obstacle)
         return gaze.within_speed(twist)
+
+    def _searching_twist(self, percept: Percept, T_base_cam: FloatArray) -> FloatArray:
+        """Rise and back off, gaze on the expected place: what hides it stands on the table. Then look around."""
+        gains, fixation = self.gains, percept.fixation
+        seconds = percept.time - self._phase_start
+        if seconds > gains.search_seconds:
+            return gaze.searching_twist(seconds - gains.search_seconds, gains.gaze)
+        lateral = gaze.within_reach(np.array([0.0, -gains.search_climb]), T_base_cam, fixation.point_base, gains.gaze)
+        back = -gains.retreat_speed if fixation.distance_m < gains.search_distance else 0.0
+        expected = np.clip(fixation.centroid, -_FAR_OFF, _FAR_OFF) if fixation.initialised else np.zeros(2)
+        level = gaze.levelling(T_base_cam, gains.gaze)
+        return gaze.fixating_twist(np.array([*lateral, back]), expected, fixation.distance_m, level, gains.gaze)
 
     def _fixating_twist(self, percept: Percept, T_base_cam: FloatArray, obstacle: ObstacleTerm) -> FloatArray:
         """Eqs. 6-8 together."""
@@ -172,11 +193,11 @@ class ServoPolicy:
             gains.cycle_amplitude,
             gains.cycle_rate,
             gains.obstacle_gain,
-            certainty * self._shunned_direction(obstacle),
+            -certainty * self._way_out(percept, T_base_cam) if certainty > 0.0 else np.zeros(2),
         )
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
         v = np.array([*lateral, self._forward_speed(fixation.distance_m, obstacle, certainty)])
-        roll_error = self._roll_error(percept, T_base_cam)
+        roll_error = self._roll_error(percept, T_base_cam, certainty)
         return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, gains.gaze)
 
     def _forward_speed(self, distance: float, obstacle: ObstacleTerm, certainty: float) -> float:
@@ -189,15 +210,23 @@ class ServoPolicy:
         wanted = servo_laws.approach_speed(distance, gains.desired_distance, gains.approach_gain)
         return min(wanted, gains.approach_speed) * (1.0 - certainty)
 
-    def _shunned_direction(self, obstacle: ObstacleTerm) -> FloatArray:
-        """obs_xy of unit length; what is straight ahead is passed above."""
-        # Clipped, so that "up" never turns into a way down to the table.
-        direction = np.clip(obstacle.centre, -1.0, 1.0) + np.array([0.0, self.gains.obstacle_up])
-        return direction / max(float(np.linalg.norm(direction)), 1e-6)
+    def _way_out(self, percept: Percept, T_base_cam: FloatArray) -> FloatArray:
+        """Lateral unit vector towards the nearest direction that is free by a little more than needed, shape (2,)."""
+        gains, target = self.gains, percept.fixation.point_base
+        points, evidence = believed_points(self._memory, self._memory_settings)
+        margin = 2.0 * gains.obstacle_margin
+        return way_out(points, evidence, target, T_base_cam, gains.obstacle_evidence, margin, gains.gaze)
 
-    def _roll_error(self, percept: Percept, T_base_cam: FloatArray) -> float:
-        """Angle to turn about the optical axis: level from afar, across the target's narrow axis when near, rad."""
-        gains = self.gains.gaze
-        if percept.fixation.distance_m < gains.align_distance and percept.segmentation.whole:
-            return narrow_axis(percept.segmentation.mask, gaze.roll(T_base_cam), gains.max_roll)
-        return gaze.levelling(T_base_cam, gains)
+    def _roll_error(self, percept: Percept, T_base_cam: FloatArray, certainty: float) -> float:
+        """Angle to turn about the optical axis, rad: level from afar, or if that frees the way of the hand.
+
+        Otherwise across the target's narrow axis.
+        """
+        gains, roll = self.gains.gaze, gaze.roll(T_base_cam)
+        near = percept.fixation.distance_m < gains.align_distance and percept.segmentation.whole
+        if not near or certainty == 1.0:
+            return gaze.levelling(T_base_cam, gains)
+        turn = narrow_axis(percept.segmentation.mask, roll, gains.max_roll)
+        turned = self._obstacle_term(percept, T_base_cam @ exp_twist(_ROLL, turn))
+        blocked = turned.evidence > self.gains.obstacle_evidence
+        return gaze.levelling(T_base_cam, gains) if blocked else turn

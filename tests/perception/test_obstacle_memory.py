@@ -53,9 +53,25 @@ def test_what_the_camera_sees_through_is_forgotten_at_once():
     assert len(believed_points(memory, SETTINGS)[0]) == 0
 
 
-def test_what_is_no_longer_seen_fades_within_a_few_decay_times():
+@pytest.mark.parametrize(("depth", "forgotten"), [(0.30, False), (0.36, True)])
+def test_a_point_is_forgotten_where_something_clearly_behind_it_is_seen_though_still_in_front(depth, forgotten):
     memory = see(patch(1.0), 8)
-    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, POSE, 0.5 + 0.2 * SETTINGS.decay_s, SETTINGS)
+    before = len(believed_points(memory, SETTINGS)[0])
+    memory = see(patch(1.0, depth=depth, half=9), 8, memory, start=0.4)
+    points, _ = believed_points(memory, SETTINGS)
+    near = (points - POSE[:3, 3]) @ POSE[:3, 2] < 0.32
+    assert near.sum() == 0 if forgotten else near.sum() >= before
+
+
+LOOKS_AWAY = look_at(np.array([0.0, 0.0, 0.5]), np.array([-0.5, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+
+
+@pytest.mark.parametrize(("pose", "decay"), [(POSE, SETTINGS.decay_in_view_s), (LOOKS_AWAY, SETTINGS.decay_s)])
+def test_what_is_not_seen_again_fades_sooner_in_view(pose, decay):
+    memory = see(patch(1.0), 8)
+    before = memory.evidence.max()
+    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, pose, memory.time + 0.3 * decay, SETTINGS)
+    assert later.evidence.max() == pytest.approx(before * np.exp(-0.3))
     assert len(believed_points(later, SETTINGS)[0]) > 0
-    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, POSE, 3.0 * SETTINGS.decay_s, SETTINGS)
+    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, pose, memory.time + 3.0 * decay, SETTINGS)
     assert len(believed_points(later, SETTINGS)[0]) == 0
