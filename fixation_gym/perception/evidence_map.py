@@ -27,6 +27,8 @@ class ZeroFlowSettings:
     """An obstacle rises above the support surface by this much at least, m."""
     max_relative_std: float = 0.25
     """A pixel has evidence if its inverse depth is known to this share of the fixated one."""
+    max_fixation_std: float = 0.15
+    """Nothing is nearer or farther than an object whose inverse depth is known to less than this share."""
     position_std_m: float = 1e-4
     """Noise of each camera position, m."""
     rotation_std_rad: float = 2e-4

@@ -66,7 +66,7 @@ class ZeroFlow:
 
 
 def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
-    """Return the result of a test that cannot be made: no motion, no flow or no fixated object."""
+    """Return the result of a test that cannot be made: no motion, no flow, or no or hardly any distance to compare."""
     return ZeroFlow(
         p_nearer=np.full((height, width), 0.5, np.float32),
         supported=np.zeros((height, width), np.bool_),
@@ -96,7 +96,8 @@ def zero_flow_test(
         support_height_m: height of the horizontal support surface in base, m; None if there is none.
     """
     shape = flow.overlap.shape
-    if not flow.valid or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
+    hardly_known = gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance
+    if not flow.valid or hardly_known or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
         return unknown_zero_flow(*shape)
     usable = flow.overlap & ~widened_on_grid(gaze.target, shape, settings.target_margin_px)
     if self_mask is not None:

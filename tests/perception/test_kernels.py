@@ -22,7 +22,7 @@ needs_numba = pytest.mark.skipif(not kernels.enabled, reason="numba is not insta
 
 
 @cache
-def observations(height, width, steps=5):
+def observations(height, width, steps=9):
     """Views of a table with a red patch, a fast near post and a wall, from a circling camera."""
     forward, across = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
     scene = Scene(

@@ -12,6 +12,7 @@ from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception.dot_product_rule import dot_product_front
 from fixation_gym.perception.region_vote import Side, VoteSettings, decide, region_votes
 from fixation_gym.perception.target_motion import contradiction, target_inverse_depth
+from fixation_gym.perception.zero_flow import Gaze, ZeroFlowSettings, zero_flow_test
 
 
 @pytest.mark.parametrize("v_z", [0.0, 0.05])
@@ -99,3 +100,12 @@ def test_with_the_focus_of_expansion_inside_the_image_its_surroundings_are_unkno
     assert not percept.zfc.supported[focus].any()
     assert np.isfinite(percept.zfc.p_nearer).all()
     assert CAMERA.width == 2 * grid.width
+
+
+def test_nothing_is_nearer_than_an_object_whose_distance_is_hardly_known():
+    perception, percept, _, (_, index, pose) = run(POSTERS, 18)
+    first, _, last = perception._frames
+    twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
+    for std, known in ((0.1, True), (0.2, False)):
+        gaze = Gaze(twist, 2.5, std * 2.5, index == 1, pose)
+        assert zero_flow_test(percept.flow, gaze, ZeroFlowSettings()).supported.any() == known
