@@ -51,8 +51,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     | ``camera_twist`` | (6,) | measured twist [v, w] in the camera frame, m/s and rad/s |
     | ``time`` | (1,) | s since reset |
 
-    **Reward** ``"dense"``: potential-based progress, +10 on success, -5 for the first collision; ``"sparse"``: +1 on
-    success, -1 for the first collision. The terms are in ``info["reward_terms"]`` and sum to the reward.
+    **Reward** ``"dense"``: potential-based progress, -0.004 per step, +10 on success, -5 for the first collision;
+    ``"sparse"``: +1 on success, -1 for the first collision. The terms, ``progress``, ``time``, ``success`` and
+    ``collision``, are in ``info["reward_terms"]`` and sum to the reward.
 
     **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.50 m away,
     looking within 9 cm of it; of two red objects the target is the one nearer to the first image's centre.
