@@ -47,8 +47,10 @@ class TrainConfig:
     """Episodes of each evaluation, always the same ones."""
     checkpoint_minutes: float = 5.0
     """Time between checkpoints; another follows every evaluation."""
-    learning_starts: int = 2_000
+    learning_starts: int = 1_000
     """SAC: random decisions before learning begins."""
+    gradient_steps: int = 4
+    """SAC: per decision of all workers."""
     buffer_size: int = 150_000
     """SAC: decisions kept."""
 
@@ -74,7 +76,7 @@ class TrainConfig:
         check_names([self.algorithm], ALGORITHMS, "algorithm")
         check_names([self.scenario], SCENARIO_NAMES, "scenario")
         check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
-        for name in ("steps", "workers", "eval_every", "eval_episodes", "buffer_size"):
+        for name in ("steps", "workers", "eval_every", "eval_episodes", "gradient_steps", "buffer_size"):
             if getattr(self, name) < 1:
                 raise UsageError(f"--{name.replace('_', '-')} must be at least 1, got {getattr(self, name)}")
         if not 0 <= self.seed < 1000:

@@ -9,7 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from policies.rl.inputs import Memory, busy, input_space, network_inputs, remember
+from fixation_gym.envs.pick_env import FixationPickEnv
+from policies.rl.inputs import Memory, blind_stage, busy, input_space, network_inputs, remember
 
 PERIODS = 5
 """Control periods for which an action is held: 5 decisions per second."""
@@ -22,7 +23,9 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
 
     ``step`` holds an action for ``PERIODS`` control periods. If it triggers the grasp, it goes on until the manoeuvre
     has ended and the next action counts: steps whose actions are ignored would teach nothing, and with random
-    actions they are nearly all. Rewards and ``info["reward_terms"]`` are summed; ``info["periods"]`` counts.
+    actions they are nearly all. While the tool goes in, the fingers close and lift, no image is rendered: that is open
+    loop anyway, and it is most of the time of a manoeuvre. Rewards and ``info["reward_terms"]`` are summed;
+    ``info["periods"]`` counts.
     """
 
     def __init__(self, env: gym.Env[Any, Any], observation: str) -> None:
@@ -31,6 +34,9 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
         self.observation_space = input_space(observation)
         self.action_space = spaces.Box(-1.0, 1.0, env.action_space.shape, np.float32)
         self._memory: Memory | None = None
+        base = env.unwrapped
+        assert isinstance(base, FixationPickEnv)
+        self._base = base
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -50,6 +56,7 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
             total, periods = total + float(reward), periods + 1
             terms = {name: terms.get(name, 0.0) + value for name, value in info["reward_terms"].items()}
             was_grasping, grasping = grasping, busy(obs)
+            self._base.camera_on = not blind_stage(obs)
             decide = was_grasping or periods >= PERIODS
             if terminated or truncated or (decide and not grasping):
                 break

@@ -15,7 +15,7 @@ SAC_SETTINGS: dict[str, Any] = {
     "batch_size": 256,
     "tau": 0.01,
     "train_freq": 1,
-    "gradient_steps": -1,  # as many as environments: one per decision
+    "gradient_steps": 0,  # those of policies.rl.overlap take place while the environments step
     "ent_coef": "auto_0.1",
     "target_entropy": -4.0,
     "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256]},

@@ -77,6 +77,11 @@ def busy(obs: Mapping[str, Any]) -> bool:
     return bool(obs["proprio"][STAGE].any())
 
 
+def blind_stage(obs: Mapping[str, Any]) -> bool:
+    """Whether the hand acts without looking: all of a manoeuvre but the recovery, after which it looks again."""
+    return bool(obs["proprio"][STAGE][:3].any())
+
+
 def _vector(fixation: NDArray[np.float32], proprio: NDArray[np.float32]) -> NDArray[np.float32]:
     """Fixation and proprioception, each value of the order of 1; the stage is left out: decisions are made in none."""
     x, y, visible, distance, std = fixation

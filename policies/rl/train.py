@@ -22,6 +22,7 @@ from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, rea
 from policies.rl.config import TrainConfig
 from policies.rl.environments import closing, draw_new_scenes, start_workers, worker_deaths
 from policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
+from policies.rl.overlap import BusyEnvs, learn_meanwhile
 from policies.rl.validation import validate
 from policies.rl.watch import Watch
 
@@ -99,17 +100,21 @@ def agent_weights(model: BaseAlgorithm) -> dict[str, Any]:
 def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Progress) -> None:
     torch.set_num_threads(1)
     with closing(start_workers(config)) as envs, _bar(config, progress) as bar:
+        busy = BusyEnvs(envs)
         if checkpoint is None:
-            model = make_model(config, envs, out)
+            model = make_model(config, busy, out)
         else:
-            model = load_model(checkpoint, _KINDS[config.algorithm], env=envs, device="cpu")
+            model = load_model(checkpoint, _KINDS[config.algorithm], env=busy, device="cpu")
         watch = Watch(progress, bar, lambda: save_checkpoint(out, model, progress), 60.0 * config.checkpoint_minutes)
         while progress.decisions < config.steps:
             # In pieces, so that one set of worker processes serves learning and evaluation.
             draw_new_scenes(envs, config, progress.decisions)
-            model.set_env(envs, force_reset=True)
+            model.set_env(busy, force_reset=True)
+            if isinstance(model, SAC):
+                learn_meanwhile(model, busy, config.gradient_steps)
             piece = min(config.eval_every, config.steps - progress.decisions)
             model.learn(piece, callback=watch, reset_num_timesteps=False, tb_log_name="run")
+            busy.meanwhile = None
             _evaluate(config, out, model, envs, progress)
             save_checkpoint(out, model, progress)
         write_agent(out / FINAL_FILE, card_of(config, progress), agent_weights(model))
