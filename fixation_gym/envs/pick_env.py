@@ -220,6 +220,11 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         """The view that makes the observation's image, opened at the first reset."""
         return self._views["observation"]
 
+    @property
+    def sensed(self) -> dict[str, Any]:
+        """The last observation, whatever a wrapper makes of it."""
+        return self._observation
+
     def perceive(self) -> Percept:
         """What perception makes of the last observation; it looks once, however often it is asked.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from fixation_gym.errors import UsageError, check_names
@@ -104,8 +103,3 @@ def require_learning_packages() -> None:
             raise UsageError(
                 f"agents need the package {package}, which is not installed: pip install 'fixation-gym[rl]'"
             )
-
-
-def is_agent_file(policy: str) -> bool:
-    """Whether a policy's name is the path of an agent."""
-    return Path(policy).suffix == ".zip"
