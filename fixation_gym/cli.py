@@ -18,7 +18,7 @@ import tyro
 
 from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
-from fixation_gym.learning_commands import Train
+from fixation_gym.learning_commands import Compare, Train
 from fixation_gym.report_commands import Ablate, Report, print_different, split_names
 
 
@@ -236,6 +236,7 @@ Commands = (
     | Annotated[Ablate, tyro.conf.subcommand("ablate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Compare, tyro.conf.subcommand("compare")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Scenarios, tyro.conf.subcommand("scenarios")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]

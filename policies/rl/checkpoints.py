@@ -31,13 +31,18 @@ class Progress:
     env_steps: int = 0
     """The same in control periods."""
     seconds: dict[str, float] = field(default_factory=dict)
-    """Wall time by what it was spent on: "acting" in the environments, "learning", "evaluating", "saving"."""
+    """Wall time by what it was spent on: "learning", "waiting" for the environments, "evaluating", "saving"."""
     curve: list[dict[str, Any]] = field(default_factory=list)
     """One entry per evaluation."""
 
     def spend(self, what: str, seconds: float) -> None:
         """Add wall time."""
         self.seconds[what] = self.seconds.get(what, 0.0) + seconds
+
+    def move(self, source: str, target: str, seconds: float) -> None:
+        """Count wall time that was spent on one thing for another."""
+        self.spend(source, -seconds)
+        self.spend(target, seconds)
 
     @property
     def wall_s(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from stable_baselines3 import SAC
@@ -16,6 +17,8 @@ class BusyEnvs(VecEnvWrapper):
         """Wrap environments that step in other processes."""
         super().__init__(venv)
         self.meanwhile: Callable[[], None] | None = None
+        self.waited_s = 0.0
+        """Time spent waiting for the environments after everything else was done, s."""
 
     def reset(self) -> VecEnvObs:
         """Reset all environments."""
@@ -25,7 +28,10 @@ class BusyEnvs(VecEnvWrapper):
         """Do something else, then wait for the environments."""
         if self.meanwhile is not None:
             self.meanwhile()
-        return self.venv.step_wait()
+        started = time.monotonic()
+        result = self.venv.step_wait()
+        self.waited_s += time.monotonic() - started
+        return result
 
 
 def learn_meanwhile(model: SAC, envs: BusyEnvs, gradient_steps: int) -> None:

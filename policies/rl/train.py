@@ -105,14 +105,16 @@ def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Pr
             model = make_model(config, busy, out)
         else:
             model = load_model(checkpoint, _KINDS[config.algorithm], env=busy, device="cpu")
-        watch = Watch(progress, bar, lambda: save_checkpoint(out, model, progress), 60.0 * config.checkpoint_minutes)
+        watch = Watch(
+            busy, progress, bar, lambda: save_checkpoint(out, model, progress), 60.0 * config.checkpoint_minutes
+        )
         while progress.decisions < config.steps:
             # In pieces, so that one set of worker processes serves learning and evaluation.
             draw_new_scenes(envs, config, progress.decisions)
             model.set_env(busy, force_reset=True)
             if isinstance(model, SAC):
                 learn_meanwhile(model, busy, config.gradient_steps)
-            piece = min(config.eval_every, config.steps - progress.decisions)
+            piece = min(config.eval_every - progress.decisions % config.eval_every, config.steps - progress.decisions)
             model.learn(piece, callback=watch, reset_num_timesteps=False, tb_log_name="run")
             busy.meanwhile = None
             _evaluate(config, out, model, envs, progress)

@@ -11,6 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from policies.rl.checkpoints import Progress
+from policies.rl.overlap import BusyEnvs
 
 _RECENT = 100
 """Episodes over which the rates of training are taken."""
@@ -19,17 +20,20 @@ _RECENT = 100
 class Watch(BaseCallback):
     """Updates a run's progress and its bar, and asks for a checkpoint from time to time."""
 
-    def __init__(self, progress: Progress, bar: tqdm, save: Callable[[], object], save_every_s: float) -> None:
+    def __init__(
+        self, envs: BusyEnvs, progress: Progress, bar: tqdm, save: Callable[[], object], save_every_s: float
+    ) -> None:
         """Prepare.
 
         Args:
+            envs: to learn in.
             progress: so far; is updated.
             bar: of decisions.
             save: saves a checkpoint.
             save_every_s: time between checkpoints, s.
         """
         super().__init__()
-        self._progress, self._bar, self._save, self._save_every_s = progress, bar, save, save_every_s
+        self._envs, self._progress, self._bar, self._save, self._save_every_s = envs, progress, bar, save, save_every_s
         self._recent: deque[tuple[bool, bool]] = deque(maxlen=_RECENT)
 
     def _on_training_start(self) -> None:
@@ -51,7 +55,9 @@ class Watch(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        self._spent("acting")
+        self._spent("learning")
+        self._progress.move("learning", "waiting", self._envs.waited_s)
+        self._envs.waited_s = 0.0
         self.logger.record("time/env_steps", self._progress.env_steps)
         if self._recent:
             success, collision = np.array(self._recent).T
