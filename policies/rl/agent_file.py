@@ -89,12 +89,10 @@ def read_agent(path: Path) -> tuple[AgentCard, dict[str, Any]]:
 def _read(path: Path) -> tuple[AgentCard, bytes]:
     try:
         with zipfile.ZipFile(path) as file:
-            if not {_CARD, _WEIGHTS} <= set(file.namelist()):
-                raise UsageError(f"{path} is no agent: `fixation-gym train` writes those as best.zip and final.zip")
             values, weights = json.loads(file.read(_CARD)), file.read(_WEIGHTS)
     except OSError as error:
         raise UsageError(f"cannot read the agent {path}: {error.strerror or error}") from error
-    except (zipfile.BadZipFile, ValueError, EOFError, NotImplementedError) as error:
+    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, NotImplementedError) as error:
         raise _damaged(path) from error
     try:
         card = AgentCard(**{**values, "image_size": tuple(values["image_size"])})

@@ -81,7 +81,7 @@ def run_cell(cell: workers.Cell) -> dict[str, Any]:
     """Train and test one agent, or test the servo. It goes on where an earlier call was killed.
 
     Returns:
-        JSON-able: ``config``, ``seed``, ``curve`` and ``wall_s`` of the training, and ``scenarios`` as ``evaluate`` has.
+        JSON-able: ``config``, ``seed``, ``curve`` and ``wall_s`` of the training, ``scenarios`` as in ``evaluate``.
     """
     folder = Path(cell["folder"])
     trained: dict[str, Any] = {"curve": [], "wall_s": 0.0}
@@ -142,7 +142,7 @@ def summary_of(config: CompareConfig, results: Sequence[dict[str, Any]], wall_s:
     return {
         "configs": list(config.configs),
         "seeds": config.seeds,
-        "training": asdict(config.training),
+        "training": {**asdict(config.training), "image_size": list(config.training.image_size)},
         "test": {"scenarios": list(config.scenarios), "episodes": config.episodes, "seeds_below": SEED_BLOCK},
         "table": table_of(results),
         "curves": curves_of(results),

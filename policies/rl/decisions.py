@@ -9,7 +9,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fixation_gym.envs.pick_env import FixationPickEnv
 from policies.rl.inputs import Memory, blind_stage, busy, input_space, network_inputs, remember
 
 PERIODS = 5
@@ -34,9 +33,7 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
         self.observation_space = input_space(observation)
         self.action_space = spaces.Box(-1.0, 1.0, env.action_space.shape, np.float32)
         self._memory: Memory | None = None
-        base = env.unwrapped
-        assert isinstance(base, FixationPickEnv)
-        self._base = base
+        self._base: Any = env.unwrapped  # FixationPickEnv
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

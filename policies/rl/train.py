@@ -105,9 +105,11 @@ def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Pr
             model = make_model(config, busy, out)
         else:
             model = load_model(checkpoint, _KINDS[config.algorithm], env=busy, device="cpu")
-        watch = Watch(
-            busy, progress, bar, lambda: save_checkpoint(out, model, progress), 60.0 * config.checkpoint_minutes
-        )
+
+        def save() -> None:
+            save_checkpoint(out, model, progress)
+
+        watch = Watch(busy, progress, bar, save, 60.0 * config.checkpoint_minutes)
         while progress.decisions < config.steps:
             # In pieces, so that one set of worker processes serves learning and evaluation.
             draw_new_scenes(envs, config, progress.decisions)
@@ -118,7 +120,7 @@ def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Pr
             model.learn(piece, callback=watch, reset_num_timesteps=False, tb_log_name="run")
             busy.meanwhile = None
             _evaluate(config, out, model, envs, progress)
-            save_checkpoint(out, model, progress)
+            save()
         write_agent(out / FINAL_FILE, card_of(config, progress), agent_weights(model))
 
 
