@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from policies.rl.inputs import Memory, blind_stage, busy, input_space, network_inputs, remember
+from policies.rl.inputs import Memory, blind_stage, busy, input_space, network_inputs, observation_name, remember
 
 PERIODS = 5
 """Control periods for which an action is held: 5 decisions per second."""
@@ -27,10 +27,10 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
     ``info["periods"]`` counts.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], observation: str) -> None:
-        """Wrap an environment with the observation of that name."""
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        """Wrap ``FixationPickZFC-v0`` with any observation, or the residual learner's environment."""
         super().__init__(env)
-        self.observation_space = input_space(observation)
+        self.observation_space = input_space(observation_name(env.observation_space))
         self.action_space = spaces.Box(-1.0, 1.0, env.action_space.shape, np.float32)
         self._memory: Memory | None = None
         self._base: Any = env.unwrapped  # FixationPickEnv

@@ -42,7 +42,7 @@ def make_learner_env(config: TrainConfig, rank: int) -> gym.Env[Any, Any]:
     else:
         env = gym.make("FixationPickZFC-v0", observation=config.observation, **arguments)
     seeds = [VALIDATION_SEEDS + index for index in range(config.eval_episodes)][rank :: config.workers]
-    fixed = FixedEpisodes(DecisionEnv(env, config.observation), seeds or [VALIDATION_SEEDS])
+    fixed = FixedEpisodes(DecisionEnv(env), seeds or [VALIDATION_SEEDS])
     return Monitor(fixed, info_keywords=("is_success", "collision"))
 
 
@@ -87,6 +87,7 @@ def closing(envs: SubprocVecEnv) -> Iterator[SubprocVecEnv]:
             process.join(timeout=2.0)
             if process.is_alive():
                 process.terminate()
+                process.join()
         envs.closed = True
 
 

@@ -43,6 +43,12 @@ def input_space(observation: str) -> spaces.Dict:
     return spaces.Dict(channels)
 
 
+def observation_name(space: spaces.Space[Any]) -> str:
+    """Name of the observation that has this space."""
+    keys = space.keys() if isinstance(space, spaces.Dict) else ()
+    return next((name for name, key in VIEWS.items() if key in keys), "blind")
+
+
 def remember(memory: Memory | None, obs: Mapping[str, Any]) -> Memory | None:
     """Memory after another observation; ``memory`` is None before the first, and always without a view.
 

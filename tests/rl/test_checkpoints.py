@@ -22,7 +22,7 @@ CONFIG = TrainConfig(buffer_size=50)
 
 
 def fake_env():
-    return DecisionEnv(FakeZFC(40), "zfc")
+    return DecisionEnv(FakeZFC(40))
 
 
 @pytest.fixture
@@ -124,7 +124,7 @@ def test_a_folder_with_a_run_is_not_mixed_with_another(tmp_path, options, messag
 
 
 def dying_env():
-    return DecisionEnv(FakeZFC(40, dies_at=7), "zfc")
+    return DecisionEnv(FakeZFC(40, dies_at=7))
 
 
 def step_until_death(envs):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rl_fakes import FakeZFC
 
+from policies.rl.agent import Decider
 from policies.rl.decisions import PERIODS, DecisionEnv, FixedEpisodes, env_action
 from policies.rl.inputs import input_space
 
@@ -17,7 +18,7 @@ def inner():
 
 @pytest.fixture
 def env(inner):
-    env = DecisionEnv(inner, "zfc")
+    env = DecisionEnv(inner)
     env.reset(seed=0)
     return env
 
@@ -50,7 +51,7 @@ def test_the_camera_rests_in_a_grasp_until_the_recovery(env, inner):
 
 def test_an_episode_ends_amid_a_decision_and_amid_a_grasp():
     for length, action, periods in ((3, GO, 3), (6, GRASP, 6)):
-        env = DecisionEnv(FakeZFC(length), "zfc")
+        env = DecisionEnv(FakeZFC(length))
         env.reset(seed=0)
         *_, truncated, info = env.step(action)
         assert truncated
@@ -74,3 +75,36 @@ def test_evaluations_meet_the_same_seeds_and_training_does_not(inner):
     env.release(99)
     env.reset()
     assert inner.seeds == [1, 7, 8, 7, 7, 8, 7, 99, None]
+
+
+class MadeUpNetwork:
+    """Acts on all that it sees, and triggers every seventh time."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def predict(self, inputs, deterministic):
+        assert deterministic
+        self.calls += 1
+        trigger = 1.0 if self.calls % 7 == 0 else -1.0
+        level = inputs["view"].mean(axis=(1, 2)) / 255.0
+        return np.array([*level, inputs["vector"].mean() / 10.0, trigger], np.float32), None
+
+
+def test_an_agent_acts_at_the_control_rate_as_the_learner_did_by_decisions():
+    trained, used = FakeZFC(), FakeZFC()
+    env, network = DecisionEnv(trained), MadeUpNetwork()
+    inputs, _ = env.reset(seed=0)
+    for _ in range(20):
+        inputs, *_ = env.step(network.predict(inputs, deterministic=True)[0])
+
+    decider = Decider(MadeUpNetwork(), 4)
+    obs, _ = used.reset(seed=0)
+    held = env_action(decider.act(obs))
+    while len(used.actions) < len(trained.actions):
+        obs, *_ = used.step(held)
+        held = env_action(decider.act(obs))
+    counts = [action[3] > 0 for action in trained.actions]
+    assert any(counts)
+    # While a manoeuvre goes on the agent holds its action, which nobody looks at.
+    np.testing.assert_array_equal(used.actions, trained.actions)

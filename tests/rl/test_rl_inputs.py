@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.envs.zfc_observation import OBSERVATIONS, zfc_observation_space
-from policies.rl.inputs import busy, input_space, network_inputs, remember
+from policies.rl.inputs import busy, input_space, network_inputs, observation_name, remember
 
 
 def zfc_obs(cells, stage=None):
@@ -76,3 +76,8 @@ def test_inputs_differ_between_configurations_only_in_the_view():
 def test_busy_in_every_stage_and_only_there():
     assert not busy(zfc_obs(128))
     assert all(busy(zfc_obs(128, stage)) for stage in range(4))
+
+
+@pytest.mark.parametrize("observation", OBSERVATIONS)
+def test_an_observation_is_known_by_its_space(observation):
+    assert observation_name(zfc_observation_space(observation, (64, 80))) == observation
