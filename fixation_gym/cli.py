@@ -18,6 +18,7 @@ import tyro
 
 from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
+from fixation_gym.learning_commands import Compare, Train
 from fixation_gym.report_commands import Ablate, Report, print_different, split_names
 
 
@@ -65,7 +66,7 @@ class Evaluate:
     """Evaluate a policy over scenarios and seeds. The same command again resumes a run that was killed."""
 
     policy: str = "servo"
-    """servo, blind, random, oracle or a variant of the servo, such as servo:no_retry."""
+    """servo, blind, random, oracle, a variant of the servo, such as servo:no_retry, or the path of an agent's zip."""
     scenario: str = "clear,opaque,translucent,mirror"
     """Scenario names, separated by commas."""
     episodes: int = 20
@@ -74,8 +75,8 @@ class Evaluate:
     """Chooses the block of episode seeds: episode i has seed 100000 * SEED + i in every scenario."""
     sensor_noise: str = "nominal"
     """ideal, nominal or conservative."""
-    image_size: tuple[int, int] = (240, 320)
-    """Height and width of the wrist image, px."""
+    image_size: tuple[int, int] | None = None
+    """Height and width of the wrist image, px; 240 320 by default, for an agent those of its training."""
     workers: int = 1
     """Number of processes."""
     backend: str = "loky"
@@ -88,14 +89,16 @@ class Evaluate:
     def run(self) -> int:
         """Evaluate and print the table."""
         from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
+        from policies.catalogue import check_policy, surroundings
 
+        check_policy(self.policy)
         config = EvaluationConfig(
             policy=self.policy,
             scenarios=split_names(self.scenario),
             episodes=self.episodes,
             seed=self.seed,
             sensor_noise=self.sensor_noise,
-            image_size=self.image_size,
+            image_size=self.image_size or surroundings(self.policy).image_size,
             workers=self.workers,
             backend=self.backend,
         )
@@ -232,6 +235,8 @@ Commands = (
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Ablate, tyro.conf.subcommand("ablate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Compare, tyro.conf.subcommand("compare")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Scenarios, tyro.conf.subcommand("scenarios")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]

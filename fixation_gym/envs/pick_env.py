@@ -51,8 +51,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     | ``camera_twist`` | (6,) | measured twist [v, w] in the camera frame, m/s and rad/s |
     | ``time`` | (1,) | s since reset |
 
-    **Reward** ``"dense"``: potential-based progress, +10 on success, -5 for the first collision; ``"sparse"``: +1 on
-    success, -1 for the first collision. The terms are in ``info["reward_terms"]`` and sum to the reward.
+    **Reward** ``"dense"``: potential-based progress, -0.004 per step, +10 on success, -5 for the first collision;
+    ``"sparse"``: +1 on success, -1 for the first collision. The terms, ``progress``, ``time``, ``success`` and
+    ``collision``, are in ``info["reward_terms"]`` and sum to the reward.
 
     **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.50 m away,
     looking within 9 cm of it; of two red objects the target is the one nearer to the first image's centre.
@@ -118,6 +119,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._perception = Perception(self.intrinsics, support_height_m=TABLE_HEIGHT)
         self._percept: Percept | None = None
         self.scene: SceneSpec | None = None
+        self.camera_on = True
+        """While False, steps render nothing, and the last image and percept stay: for training, where nobody looks."""
 
     # -- Gymnasium interface -------------------------------------------------------------------------------------
 
@@ -133,6 +136,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._steps_lifted = 0
         self._collided = False
         self._perception.reset()
+        self.camera_on = True
         self._state = self._task_state()
         observation = self._observe(self.sim.data.qpos)
         if self.render_mode == "human":
@@ -216,6 +220,11 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         """The view that makes the observation's image, opened at the first reset."""
         return self._views["observation"]
 
+    @property
+    def sensed(self) -> dict[str, Any]:
+        """The last observation, whatever a wrapper makes of it."""
+        return self._observation
+
     def perceive(self) -> Percept:
         """What perception makes of the last observation; it looks once, however often it is asked.
 
@@ -230,9 +239,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     def _observe(self, exposed_qpos: FloatArray) -> dict[str, Any]:
         self._arm = state = self.sim.arm_state()
         observation: dict[str, Any] = {}
-        if self._image_size is not None:
+        if self._image_size is not None and self.camera_on:
             image = self._image("observation", exposed_qpos)
             self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self.np_random)
+        if self._image_size is not None:
             observation["rgb"] = self._last_rgb.copy()
         joint_pos, joint_vel = sensors.measure_joints(state.joint_pos, state.joint_vel, self.noise, self.np_random)
         pose = sensors.measure_camera_pose(
@@ -249,7 +259,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         for key, value in vectors.items():
             low, high = self._limits[key]
             observation[key] = np.minimum(np.maximum(value, low), high).astype(np.float32)
-        self._observation, self._percept = observation, None
+        self._observation = observation
+        if self.camera_on:
+            self._percept = None
         if self.render_view == "overlay" and self.render_mode == "rgb_array":
             self.perceive()  # at every step, whether or not it is shown
         return observation

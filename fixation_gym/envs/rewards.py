@@ -10,6 +10,8 @@ REWARDS = ("dense", "sparse")
 SUCCESS_BONUS = 10.0
 """Larger than all shaping of an episode together, so that hovering never pays."""
 COLLISION_COST = 5.0
+TIME_COST = 0.004
+"""Per control step, 2.5 for a whole episode at 25 Hz: hovering costs, and so does a grasp that fails."""
 _DISTANCE_WEIGHT = 2.0
 """Potential per metre between tool and target; 0.5 m at the start is worth 1."""
 _FARTHEST = 1.0
@@ -35,9 +37,10 @@ def potential(state: TaskState) -> float:
 
 
 def dense_terms(before: TaskState, after: TaskState) -> dict[str, float]:
-    """Potential-based shaping (Ng, Harada, Russell 1999, undiscounted), success bonus, cost of the first collision."""
+    """Potential-based shaping (Ng, Harada, Russell 1999, undiscounted), time, success bonus, the first collision."""
     return {
         "progress": potential(after) - potential(before),
+        "time": -TIME_COST,
         "success": SUCCESS_BONUS * float(after.success and not before.success),
         "collision": -COLLISION_COST * float(after.collision and not before.collision),
     }
@@ -47,6 +50,7 @@ def sparse_terms(before: TaskState, after: TaskState) -> dict[str, float]:
     """1 on success, -1 for the first collision."""
     return {
         "progress": 0.0,
+        "time": 0.0,
         "success": float(after.success and not before.success),
         "collision": -float(after.collision and not before.collision),
     }

@@ -23,7 +23,6 @@ from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeKey, EpisodeSto
 SEED_BLOCK = 100_000
 """Episode i of ``--seed S`` has seed S * SEED_BLOCK + i, in every scenario: policies meet the same scenes."""
 
-ENV_ID = "fixation_gym:FixationPick-v0"
 _IMAGE_SIZES = (32, 2048)
 
 
@@ -39,7 +38,8 @@ class EvaluationConfig:
     sensor_noise: str = "nominal"
     image_size: tuple[int, int] = (240, 320)
     """Height and width of the wrist image, px."""
-    env_id: str = ENV_ID
+    env_id: str | None = None
+    """None: the environment in which the policy acts."""
     workers: int = 1
     backend: str = "loky"
 
@@ -50,9 +50,9 @@ class EvaluationConfig:
             UsageError: naming the first bad value and what is allowed.
         """
         from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
-        from policies.catalogue import POLICY_NAMES
+        from policies.catalogue import check_policy
 
-        check_names([self.policy], POLICY_NAMES, "policy")
+        check_policy(self.policy)
         check_names(self.scenarios, SCENARIO_NAMES, "scenario")
         check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
         if not self.scenarios or len(set(self.scenarios)) < len(self.scenarios):
@@ -65,6 +65,18 @@ class EvaluationConfig:
             raise UsageError(f"--image-size must be within {_IMAGE_SIZES[0]}..{_IMAGE_SIZES[1]}, got {self.image_size}")
         workers.check_backend(self.backend, self.workers)
 
+    @property
+    def environment(self) -> str:
+        """Id of the environment."""
+        from policies.catalogue import surroundings
+
+        return self.env_id or surroundings(self.policy).env_id
+
+    def _file_hash(self) -> dict[str, str]:
+        """Of an agent, what its file held: another one under the same name is another policy."""
+        path = Path(self.policy)
+        return {"policy_sha256": hashlib.sha256(path.read_bytes()).hexdigest()} if path.suffix == ".zip" else {}
+
     def run_description(self) -> dict[str, Any]:
         """Everything the result of one episode depends on, apart from its scenario and seed."""
         return {
@@ -72,7 +84,8 @@ class EvaluationConfig:
             "seed": self.seed,
             "sensor_noise": self.sensor_noise,
             "image_size": list(self.image_size),
-            "env_id": self.env_id,
+            "env_id": self.environment,
+            **self._file_hash(),
             "gl": os.environ.get("MUJOCO_GL"),
             "versions": installed_versions(),
         }
@@ -85,7 +98,7 @@ class EvaluationConfig:
         """The episode with this key, as ``workers.run_cell`` takes it."""
         scenario, seed = key
         return {
-            "env_id": self.env_id,
+            "env_id": self.environment,
             "scenario": scenario,
             "policy": self.policy,
             "seed": seed,

@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.evaluation.scene_truth import scene_of
 from fixation_gym.evaluation.statistics import mean, minimum, root_mean_square
 from fixation_gym.evaluation.trace import Trace, TraceRecorder
@@ -122,7 +123,7 @@ def run_episode(
     while not (terminated or truncated):
         action = policy.act(obs)
         estimate = getattr(policy, "estimate", None)
-        recorder.add(obs, info, estimate)
+        recorder.add(_sensed(env, obs), info, estimate)
         steps.append(_record(estimate, info))
         if on_frame is not None and filmed(len(steps) - 1):
             on_frame(_render(env))
@@ -132,7 +133,7 @@ def run_episode(
             reward_terms[term] = reward_terms.get(term, 0.0) + float(value)
     if on_frame is not None:
         on_frame(_render(env))
-    recorder.add_end(obs, info)
+    recorder.add_end(_sensed(env, obs), info)
     return _result(
         (scenario, policy_name, seed), steps, recorder.trace(), bool(info["is_success"]), total, reward_terms
     )
@@ -186,6 +187,12 @@ def _record(estimate: Estimate | None, info: Mapping[str, Any]) -> Step:
         distance_true_m=float(info["distance_true_m"]),
         fixation_error_px=float(info["fixation_error_px"]),
     )
+
+
+def _sensed(env: gymnasium.Env, obs: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What the sensors read, also where the policy is shown something else."""
+    base = env.unwrapped
+    return base.sensed if isinstance(base, FixationPickEnv) else obs
 
 
 def _render(env: gymnasium.Env) -> NDArray[np.uint8]:

@@ -54,6 +54,8 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
 
     select_backend()  # before the environment's module imports robosuite
     _limit_opencv_threads()
+    from policies.catalogue import surroundings
+
     return gymnasium.make(
         cell["env_id"],
         scenario=cell["scenario"],
@@ -61,6 +63,7 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
         image_size=tuple(cell["image_size"]),
         render_mode=render_mode,
         render_view=render_view,
+        **surroundings(cell["policy"]).arguments,
     )
 
 

@@ -1,0 +1,157 @@
+"""Trained agents as policies: the same ``reset`` and ``act`` as every other, at the control rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.policies import MultiInputActorCriticPolicy
+from stable_baselines3.common.utils import ConstantSchedule
+from stable_baselines3.sac.policies import MultiInputPolicy
+
+from fixation_gym.control.open_loop import Stage
+from fixation_gym.envs.zfc_observation import OBSERVATIONS
+from fixation_gym.errors import UsageError
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.types import Observation
+from policies.base import Action, Estimate
+from policies.rl.agent_file import AgentCard, read_agent
+from policies.rl.config import CONFIGS
+from policies.rl.decisions import PERIODS, env_action
+from policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
+from policies.rl.inputs import STAGE, VIEWS, Memory, busy, input_space, network_inputs, remember
+from policies.rl.residual import ResidualServo
+from policies.servo.servo_policy import ServoPolicy
+
+_STAGES = tuple(stage.value for stage in Stage)
+
+
+class Decider:
+    """A network with the clock and the memory that it was trained with."""
+
+    def __init__(self, network: Any, size: int) -> None:
+        """Use an SB3 policy that gives actions of this size."""
+        self._network, self._size = network, size
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self._memory: Memory | None = None
+        self._periods = 0
+        self._action = np.zeros(self._size, np.float32)
+
+    def act(self, obs: Mapping[str, Any]) -> NDArray[np.float32]:
+        """Output for an observation of ``FixationPickZFC-v0``: a new one when the last has been held long enough."""
+        self._memory = remember(self._memory, obs)
+        if busy(obs):
+            self._periods = 0  # the first action after a manoeuvre is a new one
+        else:
+            if self._periods % PERIODS == 0:
+                self._action = self._network.predict(network_inputs(obs, self._memory), deterministic=True)[0]
+            self._periods += 1
+        return self._action
+
+
+class Agent:
+    """A learned policy of ``FixationPickZFC-v0``, for the observation it was trained on."""
+
+    def __init__(self, card: AgentCard, decider: Decider) -> None:
+        """Use a loaded network; see ``load_agent``."""
+        self.card = card
+        self.estimate: Estimate | None = None
+        self._decider = decider
+
+    def reset(self, seed: int | None = None) -> None:
+        """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
+        self._decider.reset()
+        self.estimate = None
+
+    def act(self, obs: Mapping[str, Any]) -> Action:
+        """Action of shape (4,)."""
+        stage = np.flatnonzero(obs["proprio"][STAGE])
+        phase = _STAGES[stage[0]] if stage.size else "approach"
+        self.estimate = Estimate(float(obs["fixation"][3]), float(obs["fixation"][4]), phase)
+        return env_action(self._decider.act(obs))
+
+
+class ResidualAgent:
+    """A learned policy of ``FixationPick-v0``: the servo, and what was learned to add to it."""
+
+    def __init__(self, card: AgentCard, decider: Decider, perception: Perception) -> None:
+        """Use a loaded network, and a perception for the camera's images."""
+        self.card = card
+        self.estimate: Estimate | None = None
+        self._decider, self._perception = decider, perception
+        self._servo = ResidualServo(ServoPolicy(perception))
+
+    def reset(self, seed: int | None = None) -> None:
+        """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
+        self._decider.reset()
+        self._servo.reset(seed)
+        self.estimate = None
+
+    def act(self, obs: Mapping[str, Any]) -> Action:
+        """Action of shape (7,)."""
+        reading = Observation.from_dict(obs)
+        shown = self._servo.look(self._perception.update(reading), reading)
+        self.estimate = self._servo.servo.estimate
+        return self._servo.action(self._decider.act(shown))
+
+
+def load_agent(path: Path, env: Any) -> Agent | ResidualAgent:
+    """The agent in a file.
+
+    Args:
+        path: written by ``fixation-gym train``.
+        env: the environment it will act in; only "residual" needs its camera.
+
+    Raises:
+        UsageError: if the file is damaged, or the agent needs another observation than ``env`` shows.
+    """
+    card, weights = read_agent(path)
+    observation = CONFIGS[card.config]
+    residual = card.config == "residual"
+    _check_observation(path, card, observation, residual, env.observation_space)
+    decider = Decider(_network(path, card, observation, 2 if residual else 4, weights), 2 if residual else 4)
+    if not residual:
+        return Agent(card, decider)
+    from fixation_gym.envs.scene import TABLE_HEIGHT
+
+    return ResidualAgent(card, decider, Perception(env.unwrapped.intrinsics, support_height_m=TABLE_HEIGHT))
+
+
+def _check_observation(path: Path, card: AgentCard, observation: str, residual: bool, space: spaces.Dict) -> None:
+    keys = set(space.keys())
+    if residual:
+        if "time" not in keys:
+            raise UsageError(f"{path} is a residual agent: it acts in FixationPick-v0")
+        return
+    view = VIEWS[observation]
+    shown = {key for key in VIEWS.values() if key in keys}
+    if "fixation" not in keys or shown != ({view} - {None}):
+        allowed = f'FixationPickZFC-v0 with observation="{observation}"'
+        assert observation in OBSERVATIONS
+        raise UsageError(f"{path} is an agent of configuration {card.config}: it acts in {allowed}")
+
+
+def _network(path: Path, card: AgentCard, observation: str, size: int, weights: dict[str, Any]) -> Any:
+    """The network with these weights; SB3's policy class around it prepares the inputs and scales the outputs."""
+    torch.set_num_threads(1)  # a single input: threads cost more than they gain
+    inputs, actions = input_space(observation), spaces.Box(-1.0, 1.0, (size,), np.float32)
+    if card.algorithm == "ppo":
+        policy = MultiInputActorCriticPolicy(inputs, actions, ConstantSchedule(0.0), **PPO_SETTINGS["policy_kwargs"])
+        target = policy
+    else:
+        policy = MultiInputPolicy(inputs, actions, ConstantSchedule(0.0), **SAC_SETTINGS["policy_kwargs"])
+        target = policy.actor
+    try:
+        target.load_state_dict(weights)
+    except (RuntimeError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(f"{path} does not hold the weights of a {card.algorithm} agent; train it anew") from error
+    policy.set_training_mode(False)
+    return policy

@@ -1,0 +1,89 @@
+"""Learning curves and final rates over seeds, with intervals: pure functions of the runs' results."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fixation_gym.evaluation.video import write_file
+from policies.rl.aggregates import bootstrap_interval, interquartile_mean
+
+CURVES_FILE, TABLE_FILE, FIGURE_FILE = "curves.csv", "table.csv", "comparison.png"
+MEASURES = {"success": "successes", "collision_free": "collision_free_successes"}
+"""Names of rates, and the counts that they come from."""
+ALL = "all"
+"""Name of the aggregate over scenarios."""
+
+
+def curves_of(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row per configuration and evaluation that all its seeds have: interquartile means with 95 % intervals.
+
+    ``env_steps`` and ``wall_min`` are means over seeds.
+    """
+    rows: list[dict[str, Any]] = []
+    for config in _configs(results):
+        curves = [result["curve"] for result in results if result["config"] == config and result["curve"]]
+        for points in zip(*curves, strict=False):
+            row: dict[str, Any] = {
+                "config": config,
+                "seeds": len(points),
+                "decisions": int(np.mean([point["decisions"] for point in points])),
+                "env_steps": float(np.mean([point["env_steps"] for point in points])),
+                "wall_min": float(np.mean([point["wall_s"] for point in points])) / 60.0,
+            }
+            for measure in MEASURES:
+                row |= _aggregate(measure, np.array([[point[measure]] for point in points]))
+            rows.append(row)
+    return rows
+
+
+def table_of(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row per configuration and scenario, and one over all scenarios if there are several."""
+    rows = []
+    for config in _configs(results):
+        runs = [result["scenarios"] for result in results if result["config"] == config]
+        scenarios = list(runs[0])
+        for name in [*scenarios, *([ALL] if len(scenarios) > 1 else [])]:
+            chosen = scenarios if name == ALL else [name]
+            row: dict[str, Any] = {"config": config, "scenario": name, "seeds": len(runs)}
+            row["episodes"] = sum(run[scenario]["episodes"] for run in runs for scenario in chosen)
+            for measure, count in MEASURES.items():
+                rates = [[run[scenario][count] / run[scenario]["episodes"] for scenario in chosen] for run in runs]
+                row |= _aggregate(measure, np.array(rates))
+            rows.append(row)
+    return rows
+
+
+def format_table(rows: Sequence[dict[str, Any]]) -> str:
+    """The table for people: rates in percent with their intervals."""
+    lines = [f"{'':12}{'scenario':18}{'seeds':>6}{'success':>22}{'without collision':>22}"]
+    for row in rows:
+        cells = "".join(
+            f"{100 * row[measure]:11.0f} [{100 * row[measure + '_low']:3.0f}, {100 * row[measure + '_high']:3.0f}]"
+            for measure in MEASURES
+        )
+        lines.append(f"{row['config']:12}{row['scenario']:18}{row['seeds']:6}{cells}")
+    return "\n".join(lines)
+
+
+def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Write rows that have the same keys."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_file(path, text.getvalue().encode())
+
+
+def _configs(results: Sequence[dict[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(result["config"] for result in results))
+
+
+def _aggregate(measure: str, scores: np.ndarray) -> dict[str, float]:
+    low, high = bootstrap_interval(scores)
+    return {measure: interquartile_mean(scores), f"{measure}_low": low, f"{measure}_high": high}

@@ -1,0 +1,105 @@
+"""What is trained and how: all numbers of a training run. Imports neither torch nor the simulator."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from fixation_gym.errors import UsageError, check_names
+
+CONFIGS: dict[str, str] = {
+    "zfc": "zfc",
+    "blind": "blind",
+    "rgb": "rgb",
+    "privileged": "privileged",
+    "residual": "zfc",
+}
+"""Names of configurations, and the observation that each gets. "residual" adds to the servo's lateral velocity."""
+ALGORITHMS = ("sac", "ppo")
+
+TRAIN_SEEDS = 2_000_000_000
+"""Where the seeds of training begin; those of ``evaluate`` are far below."""
+VALIDATION_SEEDS = 1_900_000_000
+"""Where the seeds of the evaluations during training begin."""
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """One training run. A step is a decision of the learner."""
+
+    config: str = "zfc"
+    """Name of a configuration."""
+    algorithm: str = "sac"
+    scenario: str = "mixed"
+    steps: int = 150_000
+    """Decisions to learn from, of all worker processes together."""
+    seed: int = 0
+    workers: int = 4
+    """Processes that step environments. More than cores: a grasp is one long step, and the others fill the wait."""
+    sensor_noise: str = "nominal"
+    image_size: tuple[int, int] = (96, 128)
+    """Height and width of the wrist image, px; the map's cells lie as those of 240x320."""
+    eval_every: int = 10_000
+    """Decisions between evaluations."""
+    eval_episodes: int = 32
+    """Episodes of each evaluation, always the same ones."""
+    checkpoint_minutes: float = 5.0
+    """Time between checkpoints; another follows every evaluation."""
+    learning_starts: int = 1_000
+    """SAC: random decisions before learning begins."""
+    gradient_steps: int = 4
+    """SAC: per decision of all workers."""
+    buffer_size: int = 150_000
+    """SAC: decisions kept."""
+
+    @property
+    def observation(self) -> str:
+        """The observation that the learner gets."""
+        return CONFIGS[self.config]
+
+    @property
+    def residual(self) -> bool:
+        """Whether the learner adds to the servo's velocity."""
+        return self.config == "residual"
+
+    def check(self) -> None:
+        """Check everything that can be checked without building an environment.
+
+        Raises:
+            UsageError: naming the first bad value and what is allowed.
+        """
+        from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
+
+        check_names([self.config], CONFIGS, "configuration")
+        check_names([self.algorithm], ALGORITHMS, "algorithm")
+        check_names([self.scenario], SCENARIO_NAMES, "scenario")
+        check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
+        for name in ("steps", "workers", "eval_every", "eval_episodes", "gradient_steps", "buffer_size"):
+            if getattr(self, name) < 1:
+                raise UsageError(f"--{name.replace('_', '-')} must be at least 1, got {getattr(self, name)}")
+        if not 0 <= self.seed < 1000:
+            raise UsageError(f"--seed must be within 0..999, got {self.seed}")
+        if self.checkpoint_minutes <= 0.0:
+            raise UsageError(f"--checkpoint-minutes must be above 0, got {self.checkpoint_minutes}")
+        require_learning_packages()
+
+    def identity(self) -> dict[str, Any]:
+        """What may not change between a run and its continuation, JSON-able: all but its length and its processes."""
+        values = asdict(self)
+        for name in ("steps", "workers", "eval_every", "checkpoint_minutes"):
+            del values[name]
+        return {**values, "image_size": list(self.image_size)}
+
+
+def require_learning_packages() -> None:
+    """Check that the packages of the extra "rl" are there.
+
+    Raises:
+        UsageError: naming what is missing.
+    """
+    for package in ("torch", "stable_baselines3", "tensorboard"):
+        if importlib.util.find_spec(package) is None:
+            raise UsageError(
+                f"agents need the package {package}, which is not installed: pip install 'fixation-gym[rl]'"
+            )

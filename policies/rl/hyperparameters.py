@@ -1,0 +1,32 @@
+"""Settings of the algorithms, the same for every configuration. rl-zoo3 reads them, too."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from policies.rl.features import JoinedFeatures
+
+GAMMA = 0.98
+"""Per decision: what lies 10 s ahead counts a third."""
+
+SAC_SETTINGS: dict[str, Any] = {
+    "gamma": GAMMA,
+    "learning_rate": 5e-4,
+    "batch_size": 256,
+    "tau": 0.01,
+    "train_freq": 1,
+    "gradient_steps": 0,  # those of policies.rl.overlap take place while the environments step
+    "ent_coef": "auto_0.1",
+    "target_entropy": -4.0,
+    "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256]},
+}
+PPO_SETTINGS: dict[str, Any] = {
+    "gamma": GAMMA,
+    "learning_rate": 3e-4,
+    "n_steps": 512,
+    "batch_size": 256,
+    "n_epochs": 10,
+    "gae_lambda": 0.95,
+    "ent_coef": 0.002,
+    "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256], "log_std_init": -0.5},
+}

@@ -1,0 +1,106 @@
+"""What the networks see of an observation: a vector, and a view with a short memory. Pure functions on NumPy.
+
+Training and ``Agent`` call them at every control period, so that an agent meets what it was trained on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fixation_gym.perception.evidence_map import CELLS
+
+VIEWS: dict[str, str | None] = {"zfc": "zfc_map", "blind": None, "rgb": "rgb", "privileged": "true_map"}
+"""Key of the view in the observation, by the observation's name."""
+IMAGE_CELLS = 48
+"""Images are shrunk to this height and width, px."""
+STAGE = slice(20, 24)
+"""Of ``proprio``: stage of the manoeuvre."""
+
+_VECTOR = 28
+_LEAK = 0.97
+"""Share of remembered evidence that is left after a control period: it halves in a second."""
+_GAIN = 0.25
+"""A cell that is surely nearer fills the memory in four periods."""
+_IMAGE_LEAK = 0.9
+
+Memory = NDArray[np.float32]
+"""Of a view: shape (2, h, w) for maps, in [-1, 1]: now, and what has been seen; (6, h, w) for images, grey levels."""
+
+
+def input_space(observation: str) -> spaces.Dict:
+    """Space of the networks' inputs for an observation of that name."""
+    channels: dict[str, spaces.Space[Any]] = {"vector": spaces.Box(-10.0, 10.0, (_VECTOR,), np.float32)}
+    if VIEWS[observation] == "rgb":
+        channels["view"] = spaces.Box(0, 255, (6, IMAGE_CELLS, IMAGE_CELLS), np.uint8)
+    elif VIEWS[observation] is not None:
+        channels["view"] = spaces.Box(0, 255, (2, CELLS, CELLS), np.uint8)
+    return spaces.Dict(channels)
+
+
+def observation_name(space: spaces.Space[Any]) -> str:
+    """Name of the observation that has this space."""
+    keys = space.keys() if isinstance(space, spaces.Dict) else ()
+    return next((name for name, key in VIEWS.items() if key in keys), "blind")
+
+
+def remember(memory: Memory | None, obs: Mapping[str, Any]) -> Memory | None:
+    """Memory after another observation; ``memory`` is None before the first, and always without a view.
+
+    Of a map it holds the newest, centred so that unknown is 0, and evidence that adds up and fades: what one pair of
+    frames says is noisy and sparse, and things leave the image as the camera comes near. Of images it holds the
+    newest and a running mean, whose difference shows motion.
+    """
+    if "rgb" in obs:
+        small = cv2.resize(obs["rgb"], (IMAGE_CELLS, IMAGE_CELLS), interpolation=cv2.INTER_AREA)
+        image = np.moveaxis(small, 2, 0).astype(np.float32)
+        mean = image if memory is None else _IMAGE_LEAK * memory[3:] + (1.0 - _IMAGE_LEAK) * image
+        return np.concatenate([image, mean])
+    for key in ("zfc_map", "true_map"):
+        if key in obs:
+            cells = (obs[key].astype(np.float32) - 128.0) / 127.0
+            before = np.zeros_like(cells) if memory is None else memory[1:]
+            return np.concatenate([cells, np.clip(_LEAK * before + _GAIN * cells, -1.0, 1.0)])
+    return None
+
+
+def network_inputs(obs: Mapping[str, Any], memory: Memory | None) -> dict[str, NDArray[Any]]:
+    """What the networks get, an element of ``input_space``, with the memory that includes the observation."""
+    inputs: dict[str, NDArray[Any]] = {"vector": _vector(obs["fixation"], obs["proprio"])}
+    if memory is not None:
+        levels = memory if "rgb" in obs else 128.0 + 127.0 * memory
+        inputs["view"] = np.clip(np.rint(levels), 0.0, 255.0).astype(np.uint8)
+    return inputs
+
+
+def busy(obs: Mapping[str, Any]) -> bool:
+    """Whether a manoeuvre goes on, so that actions are ignored."""
+    return bool(obs["proprio"][STAGE].any())
+
+
+def blind_stage(obs: Mapping[str, Any]) -> bool:
+    """Whether the hand acts without looking: all of a manoeuvre but the recovery, after which it looks again."""
+    return bool(obs["proprio"][STAGE][:3].any())
+
+
+def _vector(fixation: NDArray[np.float32], proprio: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Fixation and proprioception, each value of the order of 1; the stage is left out: decisions are made in none."""
+    x, y, visible, distance, std = fixation
+    position = (proprio[7:10] - (0.35, 0.0, 0.2)) / 0.2
+    twist = proprio[13:19] / np.repeat([0.15, 0.5], 3)
+    relative_std = np.log10(np.clip(std / max(distance, 1e-3), 1e-3, 1.0)) + 1.5
+    values = [
+        *(5.0 * x, 5.0 * y, visible, 5.0 * (distance - 0.3), 1.0 / max(distance, 0.1) - 3.0, relative_std),
+        *proprio[:7] / 2.0,
+        *position,
+        *2.0 * proprio[10:13],
+        *twist,
+        *(proprio[19] / 0.04 - 1.0, np.arctan2(-proprio[12], np.hypot(proprio[10], proprio[11])) * 2.0 - 1.5),
+    ]
+    # The product of the camera's bearing is what tells the way around the object from the way above it.
+    return np.clip(np.array([*values, np.arctan2(proprio[11], proprio[10])], np.float32), -10.0, 10.0)

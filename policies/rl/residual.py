@@ -1,0 +1,101 @@
+"""The residual learner: the servo policy acts, and the learner adds to its lateral velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from fixation_gym.control import gaze, servo_laws
+from fixation_gym.control.open_loop import Stage
+from fixation_gym.envs.pick_env import FixationPickEnv
+from fixation_gym.envs.zfc_observation import fixation_vector, proprio_vector, zfc_observation_space
+from fixation_gym.geometry.rigid import pose_to_matrix
+from fixation_gym.perception.pipeline import Percept
+from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
+from fixation_gym.types import Command, Observation
+from policies.catalogue import make_policy
+from policies.servo.phases import Phase
+from policies.servo.servo_policy import ServoPolicy
+
+_SHARE = 0.5
+"""Velocity added at action 1, in units of the camera's largest speed."""
+_STAGES = {stage.value: stage for stage in Stage}
+
+
+class ResidualServo:
+    """The servo with room for a learner: ``look`` at an observation, then take the ``action`` for a residual."""
+
+    def __init__(self, servo: ServoPolicy) -> None:
+        """Use a servo; its perception is not used, since ``look`` is given the percept."""
+        self.servo = servo
+
+    def reset(self, seed: int | None = None) -> None:
+        """Forget the last episode."""
+        self.servo.reset(seed)
+
+    def look(self, percept: Percept, reading: Observation) -> dict[str, NDArray[Any]]:
+        """Let the servo decide; returns what ``FixationPickZFC-v0`` would show."""
+        self._percept, self._command = percept, self.servo.command(percept, reading)
+        stage = _STAGES.get(self.phase)
+        return {
+            "zfc_map": percept.zfc.cells[None].copy(),
+            "fixation": fixation_vector(percept.fixation),
+            "proprio": proprio_vector(reading, pose_to_matrix(reading.camera_pose), stage),
+        }
+
+    @property
+    def phase(self) -> str:
+        """What the servo is doing."""
+        assert self.servo.estimate is not None
+        return self.servo.estimate.phase
+
+    def action(self, residual: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Action of ``FixationPick-v0``, shape (7,), for a residual of shape (2,) in [-1, 1]."""
+        command = self._command
+        if self.phase != Phase.SEARCH.value and self.phase not in _STAGES:
+            command = _with_lateral(command, residual, self._percept)
+        return np.array([*command.camera_twist / TWIST_LIMITS, command.gripper], np.float32)
+
+
+class ResidualEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any], NDArray[np.float32]]):
+    """``FixationPick-v0`` for the residual learner: observation "zfc", action the residual."""
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        """Wrap ``FixationPick-v0``."""
+        super().__init__(env)
+        base = env.unwrapped
+        assert isinstance(base, FixationPickEnv)
+        servo = make_policy("servo", env)
+        assert isinstance(servo, ServoPolicy)
+        self._base, self._servo = base, ResidualServo(servo)
+        self.observation_space = zfc_observation_space("zfc", (base.intrinsics.height, base.intrinsics.width))
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Draw a new scene."""
+        obs, info = self.env.reset(seed=seed, options=options)
+        self._servo.reset()
+        return self._look(obs), info
+
+    def step(self, action: NDArray[np.float32]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Run one control period."""
+        obs, reward, terminated, truncated, info = self.env.step(self._servo.action(action))
+        return self._look(obs), float(reward), terminated, truncated, info
+
+    def _look(self, obs: Mapping[str, Any]) -> dict[str, Any]:
+        return self._servo.look(self._base.perceive(), Observation.from_dict(obs))
+
+
+def _with_lateral(command: Command, residual: NDArray[np.float32], percept: Percept) -> Command:
+    """Add to v_X and v_Y, with the rotation that keeps the gaze where it is; slowed down to what the camera may do."""
+    v = _SHARE * MAX_LINEAR_SPEED * np.array([*np.clip(residual, -1.0, 1.0), 0.0])
+    rotation = servo_laws.gaze_rotation(np.zeros(2), 0.0, 1.0 / percept.fixation.distance_m, v, 0.0)
+    twist = gaze.within_speed(command.camera_twist + np.array([*v, *rotation, 0.0]))
+    return Command(twist, command.gripper)

@@ -1,0 +1,202 @@
+"""Training on Stable-Baselines3: in worker processes, resumable, with an evaluation curve."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecEnv
+from tqdm import tqdm
+
+from fixation_gym.doctor import installed_versions
+from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.source import source_commit
+from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, folder_lock, make_folder, write_json
+from policies.rl.agent_file import AgentCard, write_agent
+from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
+from policies.rl.config import TrainConfig
+from policies.rl.environments import closing, draw_new_scenes, start_workers, worker_deaths
+from policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
+from policies.rl.overlap import BusyEnvs, learn_meanwhile
+from policies.rl.validation import validate
+from policies.rl.watch import Watch
+
+BEST_FILE, FINAL_FILE = "best.zip", "final.zip"
+TENSORBOARD_FOLDER = "tensorboard"
+_KINDS: dict[str, type[BaseAlgorithm]] = {"sac": SAC, "ppo": PPO}
+
+
+def train(config: TrainConfig, out: Path, resume: bool = False) -> dict[str, Any]:
+    """Train an agent, or go on with a run that was killed.
+
+    Args:
+        config: must have passed ``check``.
+        out: folder; made if needed.
+        resume: whether to go on with the run in that folder.
+
+    Returns:
+        The summary, as in ``summary.json``.
+
+    Raises:
+        UsageError: if the folder cannot be used, holds another run, or a worker process died.
+    """
+    make_folder(out)
+    with folder_lock(out):
+        checkpoint = _check_folder(config, out, resume)
+        progress = Progress() if checkpoint is None else read_progress(checkpoint)
+        write_json(out / RUN_FILE, config.identity())
+        with worker_deaths(lambda: _advice(out)):
+            if progress.decisions < config.steps:
+                _learn(config, out, checkpoint, progress)
+        summary = summary_of(config, progress)
+        write_json(out / SUMMARY_FILE, summary)
+    return summary
+
+
+def summary_of(config: TrainConfig, progress: Progress) -> dict[str, Any]:
+    """The content of ``summary.json``."""
+    return {
+        **config.identity(),
+        "workers": config.workers,
+        "decisions": progress.decisions,
+        "env_steps": progress.env_steps,
+        "wall_s": progress.wall_s,
+        "seconds": progress.seconds,
+        "curve": progress.curve,
+        "best": max(progress.curve, key=rank, default=None),
+        "final": progress.curve[-1] if progress.curve else None,
+        "versions": installed_versions(),
+        "commit": source_commit(),
+    }
+
+
+def make_model(config: TrainConfig, envs: VecEnv, out: Path | None) -> BaseAlgorithm:
+    """A new SB3 model with this project's settings; TensorBoard logs go to ``out``."""
+    log = None if out is None else str(out / TENSORBOARD_FOLDER)
+    if config.algorithm == "ppo":
+        return PPO("MultiInputPolicy", envs, seed=config.seed, tensorboard_log=log, device="cpu", **PPO_SETTINGS)
+    return SAC(
+        "MultiInputPolicy",
+        envs,
+        seed=config.seed,
+        tensorboard_log=log,
+        device="cpu",
+        buffer_size=config.buffer_size,
+        learning_starts=config.learning_starts,
+        **SAC_SETTINGS,
+    )
+
+
+def agent_weights(model: BaseAlgorithm) -> dict[str, Any]:
+    """What acting needs of a model."""
+    return (model.actor if isinstance(model, SAC) else model.policy).state_dict()
+
+
+def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Progress) -> None:
+    torch.set_num_threads(1)
+    with closing(start_workers(config)) as envs, _bar(config, progress) as bar:
+        busy = BusyEnvs(envs)
+        if checkpoint is None:
+            model = make_model(config, busy, out)
+        else:
+            model = load_model(checkpoint, _KINDS[config.algorithm], env=busy, device="cpu")
+
+        def save() -> None:
+            save_checkpoint(out, model, progress)
+
+        watch = Watch(busy, progress, bar, save, 60.0 * config.checkpoint_minutes)
+        while progress.decisions < config.steps:
+            # In pieces, so that one set of worker processes serves learning and evaluation.
+            draw_new_scenes(envs, config, progress.decisions)
+            model.set_env(busy, force_reset=True)
+            if isinstance(model, SAC):
+                learn_meanwhile(model, busy, config.gradient_steps)
+            piece = min(config.eval_every - progress.decisions % config.eval_every, config.steps - progress.decisions)
+            model.learn(piece, callback=watch, reset_num_timesteps=False, tb_log_name="run")
+            busy.meanwhile = None
+            _evaluate(config, out, model, envs, progress)
+            save()
+        write_agent(out / FINAL_FILE, card_of(config, progress), agent_weights(model))
+
+
+def _bar(config: TrainConfig, progress: Progress) -> tqdm:
+    return tqdm(total=config.steps, initial=progress.decisions, unit="decision", dynamic_ncols=True)
+
+
+def _evaluate(config: TrainConfig, out: Path, model: BaseAlgorithm, envs: VecEnv, progress: Progress) -> None:
+    """Add to the curve, and keep the agent if it is the best so far."""
+    started = time.monotonic()
+    measures = validate(lambda inputs: model.predict(inputs, deterministic=True)[0], envs, config.eval_episodes)
+    entry = {
+        "decisions": progress.decisions,
+        "env_steps": progress.env_steps,
+        "wall_s": progress.wall_s,
+        **measures,
+    }
+    if all(rank(entry) > rank(earlier) for earlier in progress.curve):
+        write_agent(out / BEST_FILE, card_of(config, progress), agent_weights(model))
+    progress.curve.append(entry)
+    progress.spend("evaluating", time.monotonic() - started)
+    for name, value in measures.items():
+        model.logger.record(f"eval/{name}", value)
+    model.logger.dump(progress.decisions)
+    tqdm.write(
+        f"{progress.decisions} decisions, {entry['wall_s'] / 60:.1f} min: success {measures['success']:.2f}, "
+        f"without collision {measures['collision_free']:.2f}, return {measures['return']:.2f}"
+    )
+
+
+def rank(entry: dict[str, Any]) -> tuple[float, float, float]:
+    """Order of evaluations: by success, then success without collision, then return."""
+    return entry["success"], entry["collision_free"], entry["return"]
+
+
+def card_of(config: TrainConfig, progress: Progress) -> AgentCard:
+    """What an agent of this run is, now."""
+    return AgentCard(
+        config=config.config,
+        algorithm=config.algorithm,
+        image_size=config.image_size,
+        scenario=config.scenario,
+        seed=config.seed,
+        decisions=progress.decisions,
+        env_steps=progress.env_steps,
+        versions=installed_versions(),
+    )
+
+
+def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
+    """The checkpoint to go on from; None to begin.
+
+    Raises:
+        UsageError: if the folder holds another run, or one that was not asked to be resumed.
+    """
+    path, checkpoint = out / RUN_FILE, latest_checkpoint(out)
+    if not path.exists():
+        if resume:
+            raise UsageError(f"{out} holds no training run to resume; leave out --resume to start one")
+        return None
+    try:
+        stored = dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        raise UsageError(f"{path} cannot be read ({error}); choose another --out") from error
+    wanted = json.loads(json.dumps(config.identity()))
+    differing = [key for key in {**stored, **wanted} if stored.get(key) != wanted.get(key)]
+    if differing:
+        differences = ", ".join(f"{key} {stored.get(key)} instead of {wanted.get(key)}" for key in differing)
+        raise UsageError(f"{out} holds another run, with {differences}; choose another --out")
+    if not resume:
+        raise UsageError(f"{out} holds a training run; add --resume to go on with it, or choose another --out")
+    return checkpoint
+
+
+def _advice(out: Path) -> str:
+    checkpoint = latest_checkpoint(out)
+    if checkpoint is None:
+        return "there is no checkpoint yet"
+    return f"--resume goes on from {checkpoint.name}"

@@ -1,0 +1,110 @@
+"""Agent files: what is written is read; anything else is refused in one line."""
+
+import io
+import json
+import os
+import zipfile
+
+import pytest
+import torch
+
+from fixation_gym.cli import main
+from fixation_gym.errors import UsageError
+from policies.catalogue import surroundings
+from policies.rl.agent_file import AgentCard, read_agent, read_card, write_agent
+
+CARD = AgentCard("zfc", "sac", (96, 128), "mixed", 3, 1000, 9000, {"torch": "2"})
+WEIGHTS = {"layer.weight": torch.arange(6.0).reshape(2, 3)}
+
+
+@pytest.fixture
+def agent(tmp_path):
+    path = tmp_path / "agent.zip"
+    write_agent(path, CARD, WEIGHTS)
+    return path
+
+
+def rewrite(path, **members):
+    with zipfile.ZipFile(path) as file:
+        old = {name: file.read(name) for name in file.namelist()}
+    with zipfile.ZipFile(path, "w") as file:
+        for name, data in {**old, **members}.items():
+            file.writestr(name, data)
+
+
+def test_what_is_written_is_read(agent):
+    card, weights = read_agent(agent)
+    assert card == read_card(agent) == CARD
+    assert torch.equal(weights["layer.weight"], WEIGHTS["layer.weight"])
+    assert os.listdir(agent.parent) == ["agent.zip"]
+
+
+def test_an_agent_acts_where_it_was_trained(agent):
+    place = surroundings(str(agent))
+    assert place.env_id.endswith("FixationPickZFC-v0")
+    assert place.arguments == {"observation": "zfc"}
+    assert place.image_size == (96, 128)
+    assert surroundings("servo").env_id.endswith("FixationPick-v0")
+
+
+def damage_nothing_there(path):
+    path.unlink()
+
+
+def damage_truncated(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def damage_no_zip(path):
+    path.write_text("weights")
+
+
+def damage_foreign(path):
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("data", "{}")
+        file.writestr("policy.pth", b"")
+
+
+def damage_other_version(path):
+    with zipfile.ZipFile(path) as file:
+        card = json.loads(file.read("agent.json"))
+    rewrite(path, **{"agent.json": json.dumps({**card, "format": 99})})
+
+
+def damage_card(path):
+    rewrite(path, **{"agent.json": '{"config": "zfc"}'})
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (damage_nothing_there, "No such file"),
+        (damage_truncated, "is damaged or no agent"),
+        (damage_no_zip, "is damaged or no agent"),
+        (damage_foreign, "no agent: `fixation-gym train` writes those"),
+        (damage_other_version, "agent of another version"),
+        (damage_card, "is damaged or no agent"),
+    ],
+)
+def test_evaluate_says_in_one_line_what_is_wrong_with_a_file(agent, damage, message, capsys, tmp_path):
+    damage(agent)
+    assert main(["evaluate", "--policy", str(agent), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+class Evil:
+    def __reduce__(self):
+        return (os.mkdir, ("executed",))
+
+
+def test_weights_cannot_execute_anything(agent, monkeypatch):
+    monkeypatch.chdir(agent.parent)
+    buffer = io.BytesIO()
+    torch.save({"a": Evil()}, buffer)
+    rewrite(agent, **{"actor.pth": buffer.getvalue()})
+    with pytest.raises(UsageError, match="damaged"):
+        read_agent(agent)
+    assert not (agent.parent / "executed").exists()

@@ -1,0 +1,141 @@
+"""Checkpoints: whole or not there, the last good one stays, and a run goes on from it as it was."""
+
+import json
+import resource
+
+import numpy as np
+import pytest
+from rl_fakes import FakeZFC
+from stable_baselines3 import SAC
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
+
+from fixation_gym.cli import main
+from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.storage import RUN_FILE, write_json
+from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
+from policies.rl.config import TrainConfig
+from policies.rl.decisions import DecisionEnv
+from policies.rl.environments import closing, worker_deaths
+from policies.rl.train import make_model
+
+CONFIG = TrainConfig(buffer_size=50)
+
+
+def fake_env():
+    return DecisionEnv(FakeZFC(40))
+
+
+@pytest.fixture
+def model():
+    model = make_model(CONFIG, DummyVecEnv([fake_env, fake_env]), None)
+    model.learn(20)
+    return model
+
+
+def save(folder, model, decisions):
+    return save_checkpoint(folder, model, Progress(decisions, env_steps=5 * decisions, curve=[{"decisions": 1}]))
+
+
+def test_a_checkpoint_holds_model_buffer_and_progress(tmp_path, model):
+    saved = save(tmp_path, model, 20)
+    again = load_model(saved, SAC, env=DummyVecEnv([fake_env, fake_env]))
+    assert read_progress(saved) == Progress(20, env_steps=100, curve=[{"decisions": 1}])
+    assert again.num_timesteps == model.num_timesteps
+    inputs = model.get_env().reset()
+    np.testing.assert_array_equal(
+        again.predict(inputs, deterministic=True)[0], model.predict(inputs, deterministic=True)[0]
+    )
+    assert (again.replay_buffer.pos, again.replay_buffer.full) == (model.replay_buffer.pos, model.replay_buffer.full)
+    for key, array in model.replay_buffer.observations.items():
+        np.testing.assert_array_equal(again.replay_buffer.observations[key], array)
+    np.testing.assert_array_equal(again.replay_buffer.rewards, model.replay_buffer.rewards)
+    assert again.replay_buffer.rewards.any()
+
+
+def test_a_newer_checkpoint_replaces_the_older(tmp_path, model):
+    save(tmp_path, model, 20)
+    newer = save(tmp_path, model, 40)
+    assert latest_checkpoint(tmp_path) == newer
+    assert [path.name for path in tmp_path.iterdir()] == [newer.name]
+
+
+def test_a_full_disk_leaves_the_earlier_checkpoint_intact(tmp_path, model):
+    earlier = save(tmp_path, model, 20)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))  # as if the disk had so much room
+    try:
+        with pytest.raises(UsageError, match=rf"cannot write a checkpoint .*; the last one, {earlier.name}, is intact"):
+            save(tmp_path, model, 40)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in tmp_path.iterdir()] == [earlier.name]
+    assert load_model(earlier, SAC).num_timesteps == model.num_timesteps
+
+
+def test_a_kill_amid_a_save_leaves_what_counts_as_none(tmp_path, model):
+    earlier = save(tmp_path, model, 20)
+    (tmp_path / "checkpoint-0000000040.unfinished").mkdir()
+    assert latest_checkpoint(tmp_path) == earlier
+
+
+@pytest.mark.parametrize("file", ["model.zip", "replay.npz", "progress.json"])
+def test_a_damaged_checkpoint_is_named(tmp_path, model, file):
+    saved = save(tmp_path, model, 20)
+    (saved / file).write_bytes((saved / file).read_bytes()[:100])
+    read = read_progress if file == "progress.json" else lambda path: load_model(path, SAC)
+    with pytest.raises(UsageError, match=f"the checkpoint .*{saved.name} is damaged"):
+        read(saved)
+
+
+def train(*options):
+    return main(["train", "--steps", "10", *options])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--config", "sonar"), "unknown configuration 'sonar'; choose one of zfc, blind, rgb, privileged, residual"),
+        (("--algorithm", "dqn"), "choose one of sac, ppo"),
+        (("--workers", "0"), "--workers must be at least 1"),
+        (("--seed", "-1"), "--seed must be within 0..999"),
+        (("--resume",), "holds no training run to resume"),
+    ],
+)
+def test_bad_options_end_in_one_line(tmp_path, options, message, capsys):
+    assert train(*options, "--out", str(tmp_path / "run")) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((), "add --resume to go on with it"),
+        (("--config", "blind", "--resume"), "holds another run, with config zfc instead of blind"),
+    ],
+)
+def test_a_folder_with_a_run_is_not_mixed_with_another(tmp_path, options, message, capsys):
+    write_json(tmp_path / RUN_FILE, TrainConfig(steps=99, workers=3).identity())
+    before = json.loads((tmp_path / RUN_FILE).read_text())
+    assert train(*options, "--out", str(tmp_path)) == 2
+    assert message in capsys.readouterr().err
+    assert json.loads((tmp_path / RUN_FILE).read_text()) == before
+
+
+def dying_env():
+    return DecisionEnv(FakeZFC(40, dies_at=7))
+
+
+def step_until_death(envs):
+    with worker_deaths(lambda: "go on"), closing(envs):
+        envs.reset()
+        for _ in range(3):
+            envs.step(np.zeros((2, 4), np.float32))
+
+
+def test_a_killed_worker_is_reported_and_the_others_end():
+    envs = SubprocVecEnv([fake_env, dying_env], start_method="spawn")
+    with pytest.raises(UsageError, match=r"a worker process died.*; go on"):
+        step_until_death(envs)
+    assert not any(process.is_alive() for process in envs.processes)
