@@ -89,22 +89,30 @@ class Fixation:
     """False until the object was seen once; then the point is only the prior guess on the optical axis."""
 
 
-def initialise(centroid: FloatArray, T_base_cam: FloatArray, settings: DistanceSettings) -> DistanceState:
+def initialise(
+    centroid: FloatArray,
+    T_base_cam: FloatArray,
+    settings: DistanceSettings,
+    image_std: float = 0.0,
+    touches_border: bool = False,
+) -> DistanceState:
     """Start at the first sight of the object, with the prior distance.
 
     Args:
         centroid: normalised image coordinates, shape (2,).
         T_base_cam: camera pose in base, shape (4, 4); it becomes the anchor.
         settings: prior and noise.
+        image_std: as for ``update``.
+        touches_border: as for ``update``.
     """
     rho = 1.0 / settings.initial_distance_m
-    ray_std = _ray_std(settings, 0.0, False)
+    ray_std = _ray_std(settings, image_std, touches_border)
     variances = [ray_std**2, ray_std**2, (settings.initial_relative_std * rho) ** 2]
     return DistanceState(np.array(T_base_cam), np.array([*centroid, rho]), np.diag(variances))
 
 
 def predict(
-    state: DistanceState, dt: float, settings: DistanceSettings, visible: bool = True, slide: float = 0.0
+    state: DistanceState, dt: float, settings: DistanceSettings, visible: bool = True, slide_m: float = 0.0
 ) -> DistanceState:
     """Let the object walk randomly for ``dt`` s; more so while it is not seen.
 
@@ -113,13 +121,13 @@ def predict(
         dt: time to pass, s.
         settings: random walks.
         visible: whether the object is seen now.
-        slide: standard deviation of what the centroid moved on the object meanwhile, normalised coordinates.
+        slide_m: standard deviation of what the centroid moved on the object meanwhile, m.
     """
     alpha, beta, rho = state.mean.tolist()
     walk = settings.walk_m if visible else settings.lost_walk_m
     # A displacement of the point by 1 m along x, y, z changes (alpha, beta, rho) by rho times (1, 0, 0), (0, 1, 0) and
     # (-alpha, -beta, -rho).
-    q = walk**2 * dt * rho**2 + slide**2
+    q = (walk**2 * dt + slide_m**2) * rho**2
     noise = [
         [q * (1.0 + alpha * alpha), q * alpha * beta, q * alpha * rho],
         [q * alpha * beta, q * (1.0 + beta * beta), q * beta * rho],
@@ -156,7 +164,8 @@ def update(
         rejected = state.rejected + 1
         if rejected >= settings.alarm_count:
             depth, std, _ = distance_at(state, T_base_cam, settings)
-            return restart(centroid, T_base_cam, depth, math.hypot(std, settings.jump_std_m), settings)
+            std = math.hypot(std, settings.jump_std_m)
+            return restart(centroid, T_base_cam, depth, std, settings, image_std, touches_border)
         return replace(state, nis=nis, rejected=rejected)
     for _ in range(2):
         mean, _, gain, jacobian = _gauss_newton_step(view, prior, mean, cov, seen, noise)
@@ -289,10 +298,16 @@ def _ray_std(settings: DistanceSettings, image_std: float, touches_border: bool)
 
 
 def restart(
-    centroid: FloatArray, T_base_cam: FloatArray, depth: float, std: float, settings: DistanceSettings
+    centroid: FloatArray,
+    T_base_cam: FloatArray,
+    depth: float,
+    std: float,
+    settings: DistanceSettings,
+    image_std: float = 0.0,
+    touches_border: bool = False,
 ) -> DistanceState:
     """Begin anew where the object is seen now, with its depth and standard deviation from elsewhere, m."""
-    fresh = initialise(centroid, T_base_cam, settings)
+    fresh = initialise(centroid, T_base_cam, settings, image_std, touches_border)
     rho = 1.0 / max(depth, MIN_DEPTH_M)
     cov = fresh.cov.copy()
     cov[2, 2] = min(std * rho**2, settings.initial_relative_std * rho) ** 2

@@ -2,7 +2,7 @@
 
 One frame shows only edges that happen to lie across the motion, and what leaves the image is still there. So every
 pixel that is surely in front leaves its 3-D point; points fade within seconds, sooner in view than out of it, and
-vanish at once where the camera sees through them. Value in, value out.
+vanish within a few frames where the camera sees through them. Value in, value out.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class MemorySettings:
     decay_s: float = 20.0
     """Time in which evidence fades to 1/e, s."""
     decay_in_view_s: float = 5.0
-    """... of points in view: what stands there is seen again and again, what has moved on is not, s."""
+    """... where something is known near it in the image: what stands there is seen again, what moved on is not, s."""
     contradiction: float = 0.6
     """Factor on the evidence of a point where the camera now sees something behind it."""
     contradiction_share: float = 0.08
@@ -82,8 +82,8 @@ def remember(
         time: of the test, s.
         settings: how evidence is kept.
     """
-    in_view, contradicted = _looked_at(memory, zero_flow, intrinsics, T_base_cam, settings)
-    decay_s = np.where(in_view, settings.decay_in_view_s, settings.decay_s)
+    tested, contradicted = _looked_at(memory, zero_flow, intrinsics, T_base_cam, settings)
+    decay_s = np.where(tested, settings.decay_in_view_s, settings.decay_s)
     faded = memory.evidence * np.exp(-max(0.0, time - memory.time) / decay_s)
     faded = faded * np.where(contradicted, settings.contradiction, 1.0)
     seen = _front_points(zero_flow, intrinsics, T_base_cam, settings)
@@ -124,16 +124,18 @@ def _looked_at(
     T_base_cam: FloatArray,
     settings: MemorySettings,
 ) -> tuple[MaskArray, MaskArray]:
-    """Points that are in the image, and those at whose pixel something clearly behind is seen; each of shape (n,)."""
+    """Points near whose pixel something is known, and those where it is clearly behind them; each of shape (n,)."""
     points = transform(inverse(T_base_cam), (memory.keys + 0.5) * settings.voxel_m)
     with np.errstate(invalid="ignore"):
         pixels = np.rint(intrinsics.project(points))
         in_view = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
-    contradicted = np.zeros(len(points), dtype=np.bool_)
+    tested, contradicted = np.zeros((2, len(points)), dtype=np.bool_)
     columns, rows = pixels[in_view].astype(np.int64).T
+    known = zero_flow.supported
     nearest_possible = zero_flow.inverse_depth + np.float32(2.0) * zero_flow.inverse_depth_std
     # A point is known to its voxel only, and the background starts at the outline of what it belongs to.
-    nearest_around = cv2.dilate(np.where(zero_flow.supported, nearest_possible, np.float32(0.0)), _NEIGHBOURHOOD)
+    nearest_around = cv2.dilate(np.where(known | zero_flow.outline, nearest_possible, np.float32(0.0)), _NEIGHBOURHOOD)
     behind = nearest_around[rows, columns] * points[in_view, 2] < 1.0 - settings.contradiction_share
-    contradicted[in_view] = zero_flow.supported[rows, columns] & behind
-    return in_view, contradicted
+    tested[in_view] = nearest_around[rows, columns] > 0.0
+    contradicted[in_view] = known[rows, columns] & behind
+    return tested, contradicted

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
+from fixation_gym.geometry.rigid import cross, inverse, pose_to_matrix, transform
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import distance_filters as distance
 from fixation_gym.perception import kernels
@@ -41,6 +41,10 @@ from fixation_gym.types import FloatArray, MaskArray, Observation
 
 _OWN_DEPTHS = 5
 """Frames over which the motion of the target's own pixels is believed."""
+_COVERING = 0.05
+"""Something covers or uncovers the target if its centroid may slide by this share of its size in a frame ..."""
+_COVERED_S = 1.0
+"""... and for this time the centroid is not to be trusted, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +134,7 @@ class Perception:
         self._state: DistanceState | None = None
         self._track: Track | None = None
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
+        self._covered_time = -math.inf
 
     @property
     def flow_intrinsics(self) -> Intrinsics:
@@ -182,16 +187,27 @@ class Perception:
         if self._state is not None:
             before = self._frames[-1]
             dt = time - before.time
-            depths = [distance.distance_at(self._state, T, settings)[0] for T in (before.T_base_cam, T_base_cam)]
-            slid = slide(before.segmentation, seen, depths[0] / depths[1], dt)
-            self._state = distance.predict(self._state, dt, settings, seen.visible, slid)
+            nearer, turned, depth = self._change_of_view(before.T_base_cam, T_base_cam)
+            slid = slide(before.segmentation, seen, nearer, turned, dt)
+            if seen.visible and (not before.segmentation.visible or slid > _COVERING * math.sqrt(_mean_variance(seen))):
+                self._covered_time = time
+            self._state = distance.predict(self._state, dt, settings, seen.visible, slid * depth)
         if not seen.visible:
             return
+        size = math.sqrt(_mean_variance(seen))
         if self._state is None:
-            self._state = distance.initialise(seen.centroid, T_base_cam, settings)
+            self._state = distance.initialise(seen.centroid, T_base_cam, settings, size, seen.touches_border)
         else:
-            size = math.sqrt(_mean_variance(seen))
             self._state = distance.update(self._state, seen.centroid, T_base_cam, settings, size, seen.touches_border)
+
+    def _change_of_view(self, T_base_before: FloatArray, T_base_now: FloatArray) -> tuple[float, float, float]:
+        """Distance of the fixated point before, as a multiple of now; turn of its line of sight, rad; depth, m."""
+        assert self._state is not None
+        depth, _, point = distance.distance_at(self._state, T_base_now, self._settings.distance)
+        before, now = point - T_base_before[:3, 3], point - T_base_now[:3, 3]
+        lengths = math.sqrt(before @ before), math.sqrt(now @ now)
+        sine = float(np.linalg.norm(cross(before, now))) / (lengths[0] * lengths[1])
+        return lengths[0] / lengths[1], sine, depth
 
     def _fixation(self, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
         settings = self._settings.distance
@@ -237,9 +253,11 @@ class Perception:
         # None takes a place, too: what the motion said long ago is about another distance.
         self._own_depths.append(target_inverse_depth(flow, twist, widened_on_grid(middle.segmentation.mask, shape, 0)))
         recent = [own for own in self._own_depths if own is not None]
-        own = contradiction(self._inverse_distance(middle.T_base_cam), recent)
+        covered = last.time - self._covered_time < _COVERED_S
+        own = contradiction(self._inverse_distance(middle.T_base_cam), recent, covered)
         if own is not None:
             self._state = _restarted(own, middle, last, self._settings.distance)
+            self._own_depths.clear()
         gaze = Gaze(twist, *self._inverse_distance(middle.T_base_cam), middle.segmentation.mask, middle.T_base_cam)
         return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
 
@@ -254,7 +272,8 @@ def _restarted(own: InverseDepth, middle: _Frame, last: _Frame, settings: Distan
     depth = 1.0 / own[0]
     point = transform(middle.T_base_cam, depth * np.array([*middle.segmentation.centroid, 1.0]))
     now = float(transform(inverse(last.T_base_cam), point)[2])
-    return distance.restart(last.segmentation.centroid, last.T_base_cam, now, own[1] * depth**2, settings)
+    size, cut = math.sqrt(_mean_variance(last.segmentation)), last.segmentation.touches_border
+    return distance.restart(last.segmentation.centroid, last.T_base_cam, now, own[1] * depth**2, settings, size, cut)
 
 
 @lru_cache(maxsize=1)

@@ -26,7 +26,7 @@ _LEAST_PIXELS = 8
 _LEAST_RECENT = 3
 _RIM = np.ones((5, 5), np.uint8)
 """Neighbourhood that a pixel of the target must share to count, px of the flow grid."""
-_LEAST_RELATIVE_STD = 0.015
+_LEAST_RELATIVE_STD = 0.02
 _SURFACE_SHARE = 0.4
 """Depth between surface and centre, as a share of the target's standard deviation across the line of sight."""
 _LARGEST_RELATIVE_STD = 0.05
@@ -69,12 +69,13 @@ def target_inverse_depth(flow: Flow, twist: FloatArray, target: MaskArray) -> In
     return float(value), float(std)
 
 
-def contradiction(believed: InverseDepth, recent: Sequence[InverseDepth]) -> InverseDepth | None:
-    """What the target's own motion says if that contradicts what is believed; None if it does not.
+def contradiction(believed: InverseDepth, recent: Sequence[InverseDepth], covered: bool) -> InverseDepth | None:
+    """What the target's own motion says if that contradicts what is believed, or is much surer; else None.
 
     Args:
         believed: inverse depth of the target from its centroid.
         recent: from the motion of its pixels, in the last frames.
+        covered: whether something covers or uncovers the target; if not, its centroid tells most, however slowly.
     """
     if len(recent) < _LEAST_RECENT:
         return None
@@ -83,4 +84,5 @@ def contradiction(believed: InverseDepth, recent: Sequence[InverseDepth]) -> Inv
     if std > _LARGEST_RELATIVE_STD * value:
         return None
     contradicts = abs(value - believed[0]) > _GATE * math.hypot(std, believed[1])
-    return (value, std) if contradicts or _MUCH_SURER * std < believed[1] else None
+    much_surer = covered and _MUCH_SURER * std < believed[1]
+    return (value, std) if contradicts or much_surer else None

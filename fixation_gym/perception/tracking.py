@@ -59,6 +59,10 @@ FIRST_LOOK = Expectation(np.zeros(2), math.inf)
 """Before the target was ever seen: of several things it is the one near the image centre."""
 
 
+NOWHERE = Expectation(np.zeros(2), 0.0)
+"""While it must be behind the camera nothing is taken for it."""
+
+
 def followed(seen: Segmentation, depth: float, T_base_cam: FloatArray, time: float) -> Track:
     """Note where the target is.
 
@@ -85,7 +89,9 @@ def expected_at(track: Track | None, T_base_cam: FloatArray, time: float, settin
         return FIRST_LOOK
     x, y, z = transform(inverse(T_base_cam), track.point)
     unseen = time - track.time
-    if z <= 0.0 or unseen > settings.forget_s:
+    if unseen > settings.forget_s:
         return FIRST_LOOK
+    if z <= 0.0:
+        return NOWHERE
     moved = settings.size_share * track.size_m + min(settings.speed * unseen, settings.largest_move_m)
     return Expectation(np.array([x / z, y / z]), settings.slack + moved / z)

@@ -54,11 +54,12 @@ class ZeroFlow:
     """Pixels that move off their epipolar line: something moves by itself there, shape (h, w)."""
     outline: MaskArray
     """Pixels that seem nearer, but lie within a window's reach of something surely behind, shape (h, w). An outline
-    belongs to the nearer thing and its motion spreads to both sides, so these may show either: no evidence."""
+    belongs to the nearer thing and its motion spreads to both sides, so these may show either: no evidence. Things too
+    thin to have an inside keep theirs."""
     cells: ImageArray
     """The map for policies, shape (32, 32): P(nearer) * 255 where known, 128 elsewhere; moving pixels count as near."""
     inverse_depth: Float32Array
-    """Estimated inverse depth, shape (h, w), 1/m; NaN without evidence."""
+    """Estimated inverse depth, shape (h, w), 1/m; NaN without evidence, but kept at outlines."""
     inverse_depth_std: Float32Array
     """Its standard deviation, shape (h, w), 1/m; inf where nothing is known."""
     fixated_inverse_depth: float
@@ -127,8 +128,12 @@ def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) 
     with np.errstate(invalid="ignore"):
         farther = depth + np.float32(2.0) * answers.inverse_depth_std < np.float32(fixated)
         nearer = depth > np.float32(fixated)
+    nearer &= answers.supported
     near_farther = cv2.dilate((farther & answers.supported).view(np.uint8), _square(settings.outline_px))
-    return nearer & near_farther.view(np.bool_)
+    outline = nearer & near_farther.view(np.bool_)
+    # A bar or a rim is nothing but outline: without a core within reach, outlines are all that is known of a thing.
+    core = cv2.dilate((nearer & ~outline).view(np.uint8), _square(2 * settings.outline_px))
+    return outline & core.view(np.bool_)
 
 
 def _mixed(moving: MaskArray, outline: MaskArray, settings: ZeroFlowSettings) -> MaskArray:

@@ -66,12 +66,16 @@ def test_a_point_is_forgotten_where_something_clearly_behind_it_is_seen_though_s
 LOOKS_AWAY = look_at(np.array([0.0, 0.0, 0.5]), np.array([-0.5, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
 
 
-@pytest.mark.parametrize(("pose", "decay"), [(POSE, SETTINGS.decay_in_view_s), (LOOKS_AWAY, SETTINGS.decay_s)])
-def test_what_is_not_seen_again_fades_sooner_in_view(pose, decay):
+@pytest.mark.parametrize(
+    ("pose", "known", "decay"),
+    [(POSE, True, SETTINGS.decay_in_view_s), (POSE, False, SETTINGS.decay_s), (LOOKS_AWAY, True, SETTINGS.decay_s)],
+)
+def test_what_is_not_seen_again_fades_sooner_where_something_is_known(pose, known, decay):
     memory = see(patch(1.0), 8)
     before = memory.evidence.max()
-    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, pose, memory.time + 0.3 * decay, SETTINGS)
+    test = patch(0.5) if known else unknown_zero_flow(40, 60)
+    later = remember(memory, test, CAMERA, pose, memory.time + 0.3 * decay, SETTINGS)
     assert later.evidence.max() == pytest.approx(before * np.exp(-0.3))
     assert len(believed_points(later, SETTINGS)[0]) > 0
-    later = remember(memory, unknown_zero_flow(40, 60), CAMERA, pose, memory.time + 3.0 * decay, SETTINGS)
+    later = remember(memory, test, CAMERA, pose, memory.time + 3.0 * decay, SETTINGS)
     assert len(believed_points(later, SETTINGS)[0]) == 0

@@ -1,14 +1,17 @@
 """The paper's dot product rule, votes of regions, and the check of the distance by the target's own motion."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
-from test_pipeline_and_zero_flow import CAMERA, POSTERS, TARGET, on_grid, run
+from pinhole_scene import Scene, noise_texture, upright
+from test_pipeline_and_zero_flow import CAMERA, POSTERS, TARGET, circling, frames, on_grid, poster_scene, run
 
 from fixation_gym.geometry.interaction import fixation_coupling, image_flow
 from fixation_gym.geometry.twist import mean_twist
+from fixation_gym.perception import pipeline
 from fixation_gym.perception.dot_product_rule import dot_product_front
 from fixation_gym.perception.region_vote import Side, VoteSettings, decide, region_votes
 from fixation_gym.perception.target_motion import contradiction, target_inverse_depth
@@ -82,12 +85,31 @@ def test_the_target_says_its_distance_by_its_own_motion():
 
 
 def test_the_distance_from_the_centroid_holds_unless_the_motion_contradicts_it_or_is_much_surer():
-    assert contradiction((2.0, 0.02), []) is None
-    assert contradiction((2.0, 0.02), [(2.05, 0.05)] * 5) is None
-    assert contradiction((3.0, 0.02), [(2.0, 0.05)] * 5) == (2.0, 0.05)
-    assert contradiction((3.0, 0.02), [(2.0, 0.05)] * 2) is None
-    assert contradiction((3.0, 0.02), [(2.0, 2.0)] * 5) is None
-    assert contradiction((2.0, 0.2), [(2.05, 0.05)] * 5) == (2.05, 0.05)
+    assert contradiction((2.0, 0.02), [], True) is None
+    assert contradiction((2.0, 0.02), [(2.05, 0.05)] * 5, True) is None
+    assert contradiction((3.0, 0.02), [(2.0, 0.05)] * 5, False) == (2.0, 0.05)
+    assert contradiction((3.0, 0.02), [(2.0, 0.05)] * 2, True) is None
+    assert contradiction((3.0, 0.02), [(2.0, 2.0)] * 5, True) is None
+    assert contradiction((2.0, 0.2), [(2.05, 0.05)] * 5, True) == (2.05, 0.05)
+    assert contradiction((2.0, 0.2), [(2.05, 0.05)] * 5, False) is None  # an uncovered centroid is left to converge
+
+
+@pytest.mark.parametrize("v_z", [0.0, 0.05])
+def test_a_target_that_nothing_covers_never_restarts_the_distance(v_z, monkeypatch):
+    restarts = []
+    monkeypatch.setattr(pipeline, "_restarted", lambda *given: restarts.append(given))
+    scene = Scene([r for number, r in enumerate(poster_scene().rectangles) if number < 2])
+    run(frames(scene, partial(circling, v_z=v_z)), 40)
+    assert not restarts
+
+
+@pytest.mark.parametrize("half_width", [0.003, 0.006])
+def test_a_thin_post_keeps_its_evidence(half_width):
+    scene = poster_scene()
+    scene.rectangles[2:] = [upright([0.26, 0.05, 0.0], half_width, 0.08, noise_texture(3, (0.3, 0.3, 0.3)))]
+    _, percept, _, (_, index, _) = run(frames(scene, circling), 18)
+    post = on_grid(index == 2, percept) > 0
+    assert (percept.zfc.supported & (percept.zfc.p_nearer > 0.95))[post].mean() > 0.5
 
 
 def test_with_the_focus_of_expansion_inside_the_image_its_surroundings_are_unknown_and_nothing_breaks():
