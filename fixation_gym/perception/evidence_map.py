@@ -28,7 +28,8 @@ class ZeroFlowSettings:
     max_relative_std: float = 0.25
     """A pixel has evidence if its inverse depth is known to this share of the fixated one."""
     max_fixation_std: float = 0.15
-    """Nothing is nearer or farther than an object whose inverse depth is known to less than this share."""
+    """While the fixated inverse depth is known to less than this share, only pixels that are decided all the same have
+    evidence."""
     position_std_m: float = 1e-4
     """Noise of each camera position, m."""
     rotation_std_rad: float = 2e-4

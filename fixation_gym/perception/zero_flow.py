@@ -25,6 +25,9 @@ from fixation_gym.perception.pixel_test import PixelAnswers, PixelQuestion, pixe
 from fixation_gym.perception.scratch import Float32Array, fill
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
+_DECIDED = 0.95
+"""Probability of a side from which on a pixel is decided."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaze:
@@ -67,7 +70,7 @@ class ZeroFlow:
 
 
 def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
-    """Return the result of a test that cannot be made: no motion, no flow, or no or hardly any distance to compare."""
+    """Return the result of a test that cannot be made: no motion, no flow or no fixated object."""
     return ZeroFlow(
         p_nearer=np.full((height, width), 0.5, np.float32),
         supported=np.zeros((height, width), np.bool_),
@@ -97,14 +100,15 @@ def zero_flow_test(
         support_height_m: height of the horizontal support surface in base, m; None if there is none.
     """
     shape = flow.overlap.shape
-    hardly_known = gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance
-    if not flow.valid or hardly_known or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
+    if not flow.valid or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
         return unknown_zero_flow(*shape)
     usable = flow.overlap & ~widened_on_grid(gaze.target, shape, settings.target_margin_px)
     if self_mask is not None:
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
     answers = pixel_answers(flow, usable, question)
+    if gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance:
+        _leave_the_decided(answers)
     outline = _outline(answers, gaze.inverse_distance, settings)
     moving = answers.moving & ~_mixed(answers.moving, outline, settings)
     # With outlines: for who moves by the map it is better that a thing seems a cell larger than smaller.
@@ -120,6 +124,14 @@ def zero_flow_test(
         inverse_depth_std=answers.inverse_depth_std,
         fixated_inverse_depth=gaze.inverse_distance,
     )
+
+
+def _leave_the_decided(answers: PixelAnswers) -> None:
+    """Take the evidence from pixels that may be on either side, in place."""
+    undecided = np.abs(answers.p_nearer - np.float32(0.5)) < np.float32(_DECIDED - 0.5)
+    fill(answers.p_nearer, 0.5, undecided)
+    fill(answers.inverse_depth, np.nan, undecided)
+    np.logical_and(answers.supported, ~undecided, out=answers.supported)
 
 
 def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) -> MaskArray:

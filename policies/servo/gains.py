@@ -23,9 +23,9 @@ class ServoGains:
     """lambda_Z of Eq. 7, m/s."""
     approach_speed: float = 0.11
     """Largest speed of the approach, m/s."""
-    climb_gain: float = 0.15
+    climb_gain: float = 0.22
     """lambda_dist of Eq. 8: speed upwards per metre of Z_f - Z_d, 1/s; grasps from above need less room."""
-    climb_until: float = math.radians(65.0)
+    climb_until: float = math.radians(72.0)
     """Elevation of the gaze above which the climb ends, rad."""
     cycle_amplitude: float = 0.02
     """Radius of the circle of Eq. 8, m."""

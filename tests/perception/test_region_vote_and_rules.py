@@ -124,10 +124,16 @@ def test_with_the_focus_of_expansion_inside_the_image_its_surroundings_are_unkno
     assert CAMERA.width == 2 * grid.width
 
 
-def test_nothing_is_nearer_than_an_object_whose_distance_is_hardly_known():
+def test_while_the_distance_is_hardly_known_only_what_is_far_off_it_is_decided():
     perception, percept, _, (_, index, pose) = run(POSTERS, 18)
     first, _, last = perception._frames
     twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
-    for std, known in ((0.1, True), (0.2, False)):
-        gaze = Gaze(twist, 2.5, std * 2.5, index == 1, pose)
-        assert zero_flow_test(percept.flow, gaze, ZeroFlowSettings()).supported.any() == known
+    shares = {}
+    for std in (0.02, 0.2, 0.6):
+        test = zero_flow_test(percept.flow, Gaze(twist, 2.5, std * 2.5, index == 1, pose), ZeroFlowSettings())
+        near, alike = (on_grid(index == number, percept) > 0 for number in (2, 4))  # at 0.24 and 0.46 m; target 0.4 m
+        shares[std] = [test.supported[patch].mean() for patch in (near, alike)]
+        assert (np.abs(test.p_nearer[test.supported] - 0.5) > 0.45).all() or std == 0.02
+    assert shares[0.2][0] > 0.8 * shares[0.02][0] > 0.2
+    assert shares[0.2][1] < 0.2 < shares[0.02][1]
+    assert max(shares[0.6]) < 0.1
