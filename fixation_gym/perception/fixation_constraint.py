@@ -25,13 +25,16 @@ from fixation_gym.types import FloatArray
 class ConstraintSettings:
     """Noise of what the constraint is applied to; defaults are the "conservative" preset."""
 
-    filter: FlowFilterSettings = field(default_factory=lambda: FlowFilterSettings(jerk=0.5))
-    """Process noise and gates; a servo changes its velocity more abruptly than a circle does. The prior of the
-    distance is not used: it is the one of ``DistanceSettings``."""
+    filter: FlowFilterSettings = field(default_factory=lambda: FlowFilterSettings(jerk=0.5, drift=1e-2))
+    """Process noise and gates; a servo changes its velocity more abruptly than a circle does, and its target may move.
+    The prior of the distance is not used: it is the one of ``DistanceSettings``."""
     velocity_std: float = 2e-3
     """Noise of each measured camera velocity, m/s: 3 mrad/s in every joint of a Panda."""
     rate_std: float = 5e-3
     """Noise of each measured camera rotation rate, rad/s."""
+    farthest_m: float = 2.0
+    """A target farther than this is out of any arm's reach, m: the filter begins anew with the first guess, as a robot
+    that believes it would run into what is in fact near."""
     centroid_std: float = 6.5e-4
     """Noise of the centroid, normalised coordinates: 0.2 px at a focal length of 308 px."""
 
@@ -75,6 +78,11 @@ def advance(
     state = flow_distance_filters.predict(gaze.filter, dt, settings.filter)
     state = flow_distance_filters.update(state, twist, noise, None, settings.filter, drift)
     return ConstrainedGaze(state, np.array(centroid), drift)
+
+
+def too_far(gaze: ConstrainedGaze, settings: ConstraintSettings) -> bool:
+    """Whether the estimate is beyond what an arm could reach, so that it must be wrong."""
+    return flow_distance_filters.distance_of(gaze.filter)[0] > settings.farthest_m
 
 
 def anchored(gaze: ConstrainedGaze, T_base_cam: FloatArray, settings: DistanceSettings) -> DistanceState:

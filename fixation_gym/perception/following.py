@@ -79,6 +79,8 @@ def follow_constraint(
     known = state or distance.initialise(seen.centroid, T_base_cam, settings)
     depth, std, _ = distance.distance_at(known, T_base_cam, settings)
     gaze = fixation_constraint.advance(gaze, seen.centroid, now.camera_twist, dt, (depth, std), constraint)
+    if fixation_constraint.too_far(gaze, constraint):
+        return distance.initialise(seen.centroid, T_base_cam, settings), None
     return fixation_constraint.anchored(gaze, T_base_cam, settings), gaze
 
 

@@ -76,6 +76,16 @@ def test_a_hidden_target_stays_where_it_was_and_the_filter_goes_on_from_there():
     assert back.distance_std_m < 2.0 * hidden.distance_std_m
 
 
+def test_an_estimate_beyond_reach_begins_anew_and_comes_back():
+    perception = Perception(CAMERA, CONSTRAINED)
+    follow(perception, range(25))
+    lost, _ = follow(perception, range(25, 50), rotation=0.0)  # translation without rotation: infinitely far
+    assert lost.distance_m == pytest.approx(CONSTRAINED.distance.initial_distance_m, rel=0.2)
+    assert lost.distance_std_m > 0.2
+    fixation, depth = follow(perception, range(50, 85))
+    assert fixation.distance_m == pytest.approx(depth, rel=0.05)
+
+
 def test_a_gaze_that_swings_to_the_target_says_nothing_about_its_distance():
     swing = np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0])  # turning right at rest: the constraint would have d = infinity
     gaze = None
