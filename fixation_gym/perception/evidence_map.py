@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ from fixation_gym.perception import kernels, pixel_kernels
 from fixation_gym.perception.scratch import Float32Array, fill
 from fixation_gym.types import ImageArray, MaskArray
 
+Rule = Literal["exact", "dot_product"]
 CELLS = 32
 """Cells along each side of the map."""
 UNKNOWN = 128
@@ -21,6 +23,8 @@ UNKNOWN = 128
 class ZeroFlowSettings:
     """Margins and gates of the test."""
 
+    rule: Rule = "exact"
+    """What tells front from behind: the exact test, or the paper's dot product, for comparison."""
     depth_margin: float = 0.05
     """An obstacle's inverse depth exceeds the fixated one by this share at least."""
     height_margin_m: float = 0.015

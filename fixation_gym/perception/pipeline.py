@@ -10,12 +10,13 @@ from functools import lru_cache
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.geometry.rigid import cross, inverse, pose_to_matrix, transform
+from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import distance_filters as distance
 from fixation_gym.perception import kernels
-from fixation_gym.perception.covering import slide
 from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState, Fixation
+from fixation_gym.perception.fixation_constraint import ConstrainedGaze, ConstraintSettings
+from fixation_gym.perception.following import Frame, follow_constraint, follow_poses, mean_variance, mended
 from fixation_gym.perception.gradients import FlowSettings
 from fixation_gym.perception.optic_flow import (
     Flow,
@@ -25,7 +26,7 @@ from fixation_gym.perception.optic_flow import (
     plane_homography,
     prepare_grey,
 )
-from fixation_gym.perception.scratch import Float32Array, Scratch
+from fixation_gym.perception.scratch import Scratch
 from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
 from fixation_gym.perception.target_motion import InverseDepth, contradiction, target_inverse_depth
 from fixation_gym.perception.tracking import Track, TrackingSettings, expected_at, followed
@@ -41,10 +42,8 @@ from fixation_gym.types import FloatArray, MaskArray, Observation
 
 _OWN_DEPTHS = 5
 """Frames over which the motion of the target's own pixels is believed."""
-_COVERING = 0.05
-"""Something covers or uncovers the target if its centroid may slide by this share of its size in a frame ..."""
 _COVERED_S = 1.0
-"""... and for this time the centroid is not to be trusted, s."""
+"""For this time after something covered or uncovered the target its centroid is not to be trusted, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +58,9 @@ class PerceptionSettings:
     """Resolution, windows and noise of the flow."""
     distance: DistanceSettings = field(default_factory=DistanceSettings)
     """Prior, noise and gates of the distance filter."""
+    constraint: ConstraintSettings | None = None
+    """If given, the distance comes from the paper's fixation constraint on the measured twist, for comparison; neither
+    poses and centroids nor the target's own motion have a say in it."""
     zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
     """Margins and gates of the zero-flow test."""
     max_gap_s: float = 0.15
@@ -81,14 +83,6 @@ class Percept:
     """Where the fixated object is now."""
     T_base_cam: FloatArray
     """Camera pose in base at the time of ``flow`` and ``zfc``, shape (4, 4)."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Frame:
-    time: float
-    grey: Float32Array
-    T_base_cam: FloatArray
-    segmentation: Segmentation
 
 
 class Perception:
@@ -130,8 +124,9 @@ class Perception:
 
     def reset(self) -> None:
         """Forget everything seen."""
-        self._frames: deque[_Frame] = deque(maxlen=3)
+        self._frames: deque[Frame] = deque(maxlen=3)
         self._state: DistanceState | None = None
+        self._constrained: ConstrainedGaze | None = None
         self._track: Track | None = None
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
         self._covered_time = -math.inf
@@ -150,12 +145,13 @@ class Perception:
         self._check(observation)
         T_base_cam = pose_to_matrix(observation.camera_pose)
         segmentation = self._segment(observation, T_base_cam)
-        self._follow(observation.time, T_base_cam, segmentation)
+        grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
+        frame = Frame(observation.time, grey, T_base_cam, observation.camera_twist, segmentation)
+        self._follow(frame)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
             self._own_depths.clear()
-        grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
-        self._frames.append(_Frame(observation.time, grey, T_base_cam, segmentation))
+        self._frames.append(frame)
         flow = self._flow()
         zero_flow = self._look_for_obstacles(flow)
         fixation = self._fixation(T_base_cam, segmentation)
@@ -181,39 +177,23 @@ class Perception:
         expected = expected_at(self._track, T_base_cam, observation.time, settings.tracking)
         return segment(observation.rgb, self._intrinsics, settings.colour, expected.centroid, expected.reach)
 
-    def _follow(self, time: float, T_base_cam: FloatArray, seen: Segmentation) -> None:
+    def _follow(self, now: Frame) -> None:
         """Advance the distance filter to now."""
-        settings = self._settings.distance
-        if self._state is not None:
-            before = self._frames[-1]
-            dt = time - before.time
-            nearer, turned, depth = self._change_of_view(before.T_base_cam, T_base_cam)
-            slid = slide(before.segmentation, seen, nearer, turned, dt)
-            if seen.visible and (not before.segmentation.visible or slid > _COVERING * math.sqrt(_mean_variance(seen))):
-                self._covered_time = time
-            self._state = distance.predict(self._state, dt, settings, seen.visible, slid * depth)
-        if not seen.visible:
+        settings = self._settings
+        before = self._frames[-1] if self._frames else None
+        if settings.constraint is None:
+            self._state, covering = follow_poses(self._state, before, now, settings.distance)
+            self._covered_time = now.time if covering else self._covered_time
             return
-        size = math.sqrt(_mean_variance(seen))
-        if self._state is None:
-            self._state = distance.initialise(seen.centroid, T_base_cam, settings, size, seen.touches_border)
-        else:
-            self._state = distance.update(self._state, seen.centroid, T_base_cam, settings, size, seen.touches_border)
-
-    def _change_of_view(self, T_base_before: FloatArray, T_base_now: FloatArray) -> tuple[float, float, float]:
-        """Distance of the fixated point before, as a multiple of now; turn of its line of sight, rad; depth, m."""
-        assert self._state is not None
-        depth, _, point = distance.distance_at(self._state, T_base_now, self._settings.distance)
-        before, now = point - T_base_before[:3, 3], point - T_base_now[:3, 3]
-        lengths = math.sqrt(before @ before), math.sqrt(now @ now)
-        sine = float(np.linalg.norm(cross(before, now))) / (lengths[0] * lengths[1])
-        return lengths[0] / lengths[1], sine, depth
+        self._state, self._constrained = follow_constraint(
+            self._state, self._constrained, before, now, settings.distance, settings.constraint
+        )
 
     def _fixation(self, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
         settings = self._settings.distance
         if not seen.visible:
             return distance.fixation_at(self._state, T_base_cam, settings)
-        return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, _mean_variance(seen))
+        return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance(seen))
 
     def _inverse_distance(self, T_base_cam: FloatArray) -> InverseDepth:
         """Of the fixated object for a camera; 0 before it was seen."""
@@ -241,7 +221,7 @@ class Perception:
         )
 
     def _look_for_obstacles(self, flow: Flow) -> ZeroFlow:
-        """Zero-flow test where the flow is; mends the distance first if the target's own motion contradicts it."""
+        """Zero-flow test where the flow is, with the distance mended first."""
         shape = flow.overlap.shape
         if not flow.valid:
             return unknown_zero_flow(*shape)
@@ -250,30 +230,23 @@ class Perception:
             self._own_depths.clear()
             return unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
+        if self._settings.constraint is None:  # the constraint takes no distance from the centroid that could be wrong
+            self._mend(flow, twist)
+        gaze = Gaze(twist, *self._inverse_distance(middle.T_base_cam), middle.segmentation.mask, middle.T_base_cam)
+        return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
+
+    def _mend(self, flow: Flow, twist: FloatArray) -> None:
+        """Begin the distance anew if the target's own motion contradicts what its centroid says."""
+        _, middle, last = self._frames
+        target = widened_on_grid(middle.segmentation.mask, flow.overlap.shape, 0)
         # None takes a place, too: what the motion said long ago is about another distance.
-        self._own_depths.append(target_inverse_depth(flow, twist, widened_on_grid(middle.segmentation.mask, shape, 0)))
+        self._own_depths.append(target_inverse_depth(flow, twist, target))
         recent = [own for own in self._own_depths if own is not None]
         covered = last.time - self._covered_time < _COVERED_S
         own = contradiction(self._inverse_distance(middle.T_base_cam), recent, covered)
         if own is not None:
-            self._state = _restarted(own, middle, last, self._settings.distance)
+            self._state = mended(own, middle, last, self._settings.distance)
             self._own_depths.clear()
-        gaze = Gaze(twist, *self._inverse_distance(middle.T_base_cam), middle.segmentation.mask, middle.T_base_cam)
-        return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
-
-
-def _mean_variance(seen: Segmentation) -> float:
-    """Of the target's pixels about their centroid, normalised coordinates."""
-    return 0.5 * float(seen.second_moments[0, 0] + seen.second_moments[1, 1])
-
-
-def _restarted(own: InverseDepth, middle: _Frame, last: _Frame, settings: DistanceSettings) -> DistanceState:
-    """The distance filter begun anew in the last frame, with the target's inverse depth in the middle one."""
-    depth = 1.0 / own[0]
-    point = transform(middle.T_base_cam, depth * np.array([*middle.segmentation.centroid, 1.0]))
-    now = float(transform(inverse(last.T_base_cam), point)[2])
-    size, cut = math.sqrt(_mean_variance(last.segmentation)), last.segmentation.touches_border
-    return distance.restart(last.segmentation.centroid, last.T_base_cam, now, own[1] * depth**2, settings, size, cut)
 
 
 @lru_cache(maxsize=1)

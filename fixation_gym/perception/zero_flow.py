@@ -3,7 +3,8 @@
 The flow is d A v + B w (Eq. 1). After the flow of the fixated plane is taken out, the rest is (d - d_f) g with
 g = A v, a vector along the epipolar line. Its length along g gives the inverse depth d = d_f + s with a standard
 deviation per pixel, straight from the windowed gradients, so an edge not parallel to g suffices. This holds for any
-twist, also during approach, where the dot-product rule of the paper ("Avoiding obstacles") bends away.
+twist, also during approach, where the dot-product rule of the paper ("Avoiding obstacles") bends away. For comparison
+that rule can be asked to decide in its place (``ZeroFlowSettings.rule``).
 
 A thing is an obstacle if it is nearer than both the fixated object and the support surface, whose depth follows from
 its height and the camera pose.
@@ -19,6 +20,7 @@ import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import epipolar_direction
+from fixation_gym.perception.dot_product_rule import dot_product_front, rule_answers
 from fixation_gym.perception.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
 from fixation_gym.perception.optic_flow import Flow
 from fixation_gym.perception.pixel_test import PixelAnswers, PixelQuestion, pixel_answers
@@ -106,7 +108,7 @@ def zero_flow_test(
     if self_mask is not None:
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
-    answers = pixel_answers(flow, usable, question)
+    answers = _answers(flow, usable, question, gaze, settings)
     if gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance:
         _leave_the_decided(answers)
     outline = _outline(answers, gaze.inverse_distance, settings)
@@ -132,6 +134,17 @@ def _leave_the_decided(answers: PixelAnswers) -> None:
     fill(answers.p_nearer, 0.5, undecided)
     fill(answers.inverse_depth, np.nan, undecided)
     np.logical_and(answers.supported, ~undecided, out=answers.supported)
+
+
+def _answers(
+    flow: Flow, usable: MaskArray, question: PixelQuestion, gaze: Gaze, settings: ZeroFlowSettings
+) -> PixelAnswers:
+    """Answers by the exact test or by the paper's rule; the latter knows no depth, but heights still tell the table."""
+    if settings.rule == "exact":
+        return pixel_answers(flow, usable, question)
+    above = pixel_answers(flow, usable, question._replace(boundary=np.float32(-np.inf)))
+    front = dot_product_front(flow, gaze.twist)
+    return rule_answers(above, front, gaze.inverse_distance, settings.depth_margin)
 
 
 def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) -> MaskArray:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fixation_gym.control.gaze import GazeGains
+from fixation_gym.perception.evidence_map import ZeroFlowSettings
+from fixation_gym.perception.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.pipeline import PerceptionSettings
 from policies.servo.gains import ServoGains
 
@@ -30,6 +32,16 @@ VARIANTS: tuple[ServoVariant, ...] = (
         "servo:no_feed_forward",
         "gaze without feed-forward of the camera's own motion",
         gains=ServoGains(gaze=GazeGains(feed_forward=False)),
+    ),
+    ServoVariant(
+        "servo:dot_product",
+        "the exact zero-flow test: the paper's dot-product rule tells front from behind",
+        perception=PerceptionSettings(zero_flow=ZeroFlowSettings(rule="dot_product")),
+    ),
+    ServoVariant(
+        "servo:hard_filter",
+        "distance from poses: the paper's fixation constraint on the measured twist gives it",
+        perception=PerceptionSettings(constraint=ConstraintSettings()),
     ),
     ServoVariant("servo:no_retry", "one grasp only", gains=ServoGains(max_grasps=1)),
 )

@@ -5,7 +5,7 @@ import pytest
 from pinhole_scene import Scene, noise_texture, upright
 from test_pipeline_and_zero_flow import CAMERA, RED, TARGET, circling, frames
 
-from fixation_gym.perception import Perception, pipeline, segment
+from fixation_gym.perception import Perception, following, pipeline, segment
 from fixation_gym.perception.covering import slide
 
 
@@ -51,6 +51,6 @@ def largest_distance_error():
 
 def test_the_distance_holds_while_a_board_covers_most_of_the_target(monkeypatch):
     assert largest_distance_error() < 0.06
-    monkeypatch.setattr(pipeline, "slide", lambda *_: 0.0)
+    monkeypatch.setattr(following, "slide", lambda *_: 0.0)
     monkeypatch.setattr(pipeline, "contradiction", lambda *_: None)
     assert largest_distance_error() > 0.1  # what the centroid alone makes of it

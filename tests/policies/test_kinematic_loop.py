@@ -28,8 +28,8 @@ def picture(T_base_cam):
     return np.where(hit[..., None], np.array([200, 10, 10]), 128).astype(np.uint8)
 
 
-def run(policy, T_base_cam, seconds, visible=lambda time: True):
-    perception, twist, trail = Perception(INTRINSICS), np.zeros(6), []
+def run(policy, T_base_cam, seconds, visible=lambda time: True, settings=None):
+    perception, twist, trail = Perception(INTRINSICS, settings), np.zeros(6), []
     for k in range(round(seconds / PERIOD)):
         time = k * PERIOD
         image = picture(T_base_cam) if visible(time) else np.full((120, 160, 3), 128, np.uint8)

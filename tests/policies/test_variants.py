@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from test_kinematic_loop import INTRINSICS, START, TARGET, run
 
 from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.robot import TOOL_IN_CAMERA
 from policies.catalogue import POLICY_NAMES, make_policy
 from policies.servo.servo_policy import ServoPolicy
 from policies.servo.variants import VARIANT_NAMES, VARIANTS, servo_variant
@@ -29,3 +33,28 @@ def test_a_policy_has_the_settings_of_its_variant() -> None:
     policy = make_policy("servo:no_feed_forward", env)
     assert isinstance(policy, ServoPolicy)
     assert policy.gains == servo_variant("servo:no_feed_forward").gains
+
+
+def test_without_poses_the_fixation_constraint_leads_the_hand_to_the_target() -> None:
+    variant = servo_variant("servo:hard_filter")
+    policy = ServoPolicy(Perception(INTRINSICS), variant.gains)
+    trail = run(policy, START, 14.0, settings=variant.perception)
+    _, estimate, T_base_cam, _ = next(item for item in trail if item[1].phase == "approach")
+    true = T_base_cam[:3, 2] @ (TARGET - T_base_cam[:3, 3])
+    assert estimate.distance_m == pytest.approx(true, rel=0.1)
+    T_base_cam = next(pose for _, estimate, pose, _ in trail if estimate.phase == "close")
+    tool = T_base_cam[:3, :3] @ TOOL_IN_CAMERA + T_base_cam[:3, 3]
+    assert np.linalg.norm(tool - TARGET) < 0.02
+
+
+@pytest.mark.parametrize("name", ["servo:dot_product", "servo:hard_filter"])
+def test_an_ablation_of_perception_leaves_the_behaviour_and_the_rest_of_perception_alone(name: str) -> None:
+    variant, full = servo_variant(name), VARIANTS[0]
+    assert variant.gains == full.gains
+    assert variant.avoid_obstacles
+    changed = [
+        field.name
+        for field in fields(variant.perception)
+        if getattr(variant.perception, field.name) != getattr(full.perception, field.name)
+    ]
+    assert len(changed) == 1

@@ -14,14 +14,13 @@ from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, CYCLE_RA
 from fixation_gym.geometry.twist import skew
 from fixation_gym.perception import calibrating_filter, distance_filters, flow_distance_filters
 from fixation_gym.perception.distance_filters import DistanceSettings
+from fixation_gym.perception.fixation_constraint import gaze_drift
 from fixation_gym.perception.flow_distance_filters import FlowFilterSettings, Kind
 from fixation_gym.perception.flow_samples import FLOW_NAMES, FlowName
 from fixation_gym.types import FloatArray
 
 ONSET_TOLERANCE, JUMP_TOLERANCE = 0.03, 0.05
 """Relative errors that count as settled after the onset of motion and after the jump."""
-_GAZE_RATE_FADING = 0.8
-"""Share of a gaze error's rate that still counts in the next frame."""
 
 
 @dataclass(frozen=True)
@@ -108,27 +107,18 @@ def _flow(recording: Recording, estimator: Estimator) -> Iterator[tuple[float, .
         initial_distance_m=recording.first_guess_m, jerk=recording.condition.amplitude_m * CYCLE_RATE**3
     )
     state = flow_distance_filters.initialise(kind, settings)
-    gaze_rate = np.zeros(2)
+    drift = np.zeros(2)
     last: Frame | None = None
     for frame in recording.frames:
         if last is not None:
             flow = None if frame.flow is None or estimator.flow is None else frame.flow[estimator.flow]
-            gaze_rate = _gaze_rate(gaze_rate, last, frame, dt)
-            state = flow_distance_filters.update(state, last.sighting.twist, last.twist_cov, flow, settings, gaze_rate)
+            seen = last.sighting.centroid, frame.sighting.centroid
+            drift = gaze_drift(drift, *seen, dt, CENTROID_STD_PX / INTRINSICS.fx)
+            state = flow_distance_filters.update(state, last.sighting.twist, last.twist_cov, flow, settings, drift)
             state = flow_distance_filters.predict(state, dt, settings)
         depth, std = flow_distance_filters.distance_of(state, frame.sighting.centroid)
         yield depth, std, depth, std, state.nis
         last = frame
-
-
-def _gaze_rate(rate: FloatArray, last: Frame, frame: Frame, dt: float) -> FloatArray:
-    """Rate at which the target drifts from where it is held, shape (2,), 1/s: what exceeds noise, fading slowly."""
-    before, now = last.sighting.centroid, frame.sighting.centroid
-    if before is None or now is None:
-        return rate
-    noise = np.sqrt(2.0) * CENTROID_STD_PX / (INTRINSICS.fx * dt)
-    excess = np.maximum(((now - before) / dt) ** 2 - (2.0 * noise) ** 2, 0.0)
-    return np.maximum(np.sqrt(excess), _GAZE_RATE_FADING * rate)
 
 
 def assess(recording: Recording, estimator: Estimator, track: Track) -> dict[str, Any]:

@@ -1,0 +1,119 @@
+"""The distance of the target from frame to frame: by poses and centroids, or by the fixation constraint alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fixation_gym.geometry.rigid import cross, inverse, transform
+from fixation_gym.perception import distance_filters as distance
+from fixation_gym.perception import fixation_constraint
+from fixation_gym.perception.covering import slide
+from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState
+from fixation_gym.perception.fixation_constraint import ConstrainedGaze, ConstraintSettings
+from fixation_gym.perception.scratch import Float32Array
+from fixation_gym.perception.segmentation import Segmentation
+from fixation_gym.perception.target_motion import InverseDepth
+from fixation_gym.types import FloatArray
+
+_COVERING = 0.05
+"""Something covers or uncovers the target if its centroid may slide by this share of its size in a frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One observation as far as later ones need it."""
+
+    time: float
+    """s."""
+    grey: Float32Array
+    """Image at the working size, shape (h, w)."""
+    T_base_cam: FloatArray
+    """Camera pose in base, shape (4, 4)."""
+    camera_twist: FloatArray
+    """Measured twist [v, w] in ``cam``, shape (6,), m/s and rad/s."""
+    segmentation: Segmentation
+    """Target in the image."""
+
+
+def follow_poses(
+    state: DistanceState | None, before: Frame | None, now: Frame, settings: DistanceSettings
+) -> tuple[DistanceState | None, bool]:
+    """Advance the distance by a frame's pose and centroid.
+
+    Args:
+        state: estimate before; None before the target was seen for the first time.
+        before: the frame before; None for the first one.
+        now: this frame.
+        settings: of the filter.
+
+    Returns:
+        The estimate, and whether something is covering or uncovering the target.
+    """
+    seen, T_base_cam, covering = now.segmentation, now.T_base_cam, False
+    if state is not None and before is not None:
+        slid = _slide(state, before, now, settings)
+        dt = now.time - before.time
+        covering = seen.visible and (not before.segmentation.visible or slid > _COVERING * _size(seen))
+        depth, _, _ = distance.distance_at(state, T_base_cam, settings)
+        state = distance.predict(state, dt, settings, seen.visible, slid * depth)
+    if not seen.visible:
+        return state, covering
+    if state is None:
+        return distance.initialise(seen.centroid, T_base_cam, settings, _size(seen), seen.touches_border), covering
+    state = distance.update(state, seen.centroid, T_base_cam, settings, _size(seen), seen.touches_border)
+    return state, covering
+
+
+def _slide(state: DistanceState, before: Frame, now: Frame, settings: DistanceSettings) -> float:
+    """Slide of the centroid since the frame before, normalised coordinates."""
+    _, _, point = distance.distance_at(state, now.T_base_cam, settings)
+    was, is_ = (point - frame.T_base_cam[:3, 3] for frame in (before, now))
+    lengths = math.sqrt(was @ was), math.sqrt(is_ @ is_)
+    turned = float(np.linalg.norm(cross(was, is_))) / (lengths[0] * lengths[1])
+    return slide(before.segmentation, now.segmentation, lengths[0] / lengths[1], turned, now.time - before.time)
+
+
+def follow_constraint(
+    state: DistanceState | None,
+    gaze: ConstrainedGaze | None,
+    before: Frame | None,
+    now: Frame,
+    settings: DistanceSettings,
+    constraint: ConstraintSettings,
+) -> tuple[DistanceState | None, ConstrainedGaze | None]:
+    """Advance the distance by the fixation constraint; arguments as in ``follow_poses``, and the constraint's own.
+
+    While the target is hidden, its point in space is kept as it is with poses.
+    """
+    seen, T_base_cam = now.segmentation, now.T_base_cam
+    dt = 0.0 if before is None else now.time - before.time
+    if not seen.visible:
+        return None if state is None else distance.predict(state, dt, settings, visible=False), None
+    known = state or distance.initialise(seen.centroid, T_base_cam, settings)
+    depth, std, _ = distance.distance_at(known, T_base_cam, settings)
+    gaze = fixation_constraint.advance(gaze, seen.centroid, now.camera_twist, dt, (depth, std), constraint)
+    if fixation_constraint.too_far(gaze, constraint):
+        return distance.initialise(seen.centroid, T_base_cam, settings), None
+    return fixation_constraint.anchored(gaze, T_base_cam, settings), gaze
+
+
+def mended(own: InverseDepth, middle: Frame, last: Frame, settings: DistanceSettings) -> DistanceState:
+    """The pose filter begun anew in the last frame, with the target's inverse depth in the middle one."""
+    depth = 1.0 / own[0]
+    point = transform(middle.T_base_cam, depth * np.array([*middle.segmentation.centroid, 1.0]))
+    now = float(transform(inverse(last.T_base_cam), point)[2])
+    seen, std = last.segmentation, own[1] * depth**2
+    return distance.restart(seen.centroid, last.T_base_cam, now, std, settings, _size(seen), seen.touches_border)
+
+
+def _size(seen: Segmentation) -> float:
+    """Standard deviation of the target's pixels about their centroid, normalised coordinates."""
+    return math.sqrt(mean_variance(seen))
+
+
+def mean_variance(seen: Segmentation) -> float:
+    """Of the target's pixels about their centroid, normalised coordinates."""
+    return 0.5 * float(seen.second_moments[0, 0] + seen.second_moments[1, 1])
