@@ -105,18 +105,28 @@ def run_cells(
     """Run all cells and yield each result as soon as it is there (with Ray, as soon as its batch is).
 
     With more than one worker, the order is not that of the cells.
+
+    Raises:
+        UsageError: if a worker process dies.
     """
     if workers == 1 and backend == "loky":
         yield from map(run, cells)
         return
     import joblib
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     # Workers inherit these. More threads than cores only get into each other's way, software rendering's included.
     for variable in ("OMP_NUM_THREADS", "LP_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     if backend == "loky":
         parallel = joblib.Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered")
-        yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells))
+        try:
+            yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells))
+        except TerminatedWorkerError as error:
+            raise UsageError(
+                "a worker process died (killed, out of memory, or a crash of the graphics driver); what is finished is "
+                "kept, and the same command goes on"
+            ) from error
         return
     from ray.util.joblib import register_ray  # pyright: ignore[reportMissingImports]
 
