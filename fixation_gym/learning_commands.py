@@ -20,7 +20,7 @@ class Train:
     """sac or ppo."""
     scenario: str = "mixed"
     """Name of the scenario to train on."""
-    steps: int = 150_000
+    steps: int = 8_000
     """Decisions to learn from; 5 per simulated second, and a whole grasp counts as one."""
     seed: int = 0
     """Chooses scenes and initial weights."""
@@ -28,7 +28,7 @@ class Train:
     """Number of processes that step environments; more than cores is good, since grasps take long."""
     sensor_noise: str = "nominal"
     """ideal, nominal or conservative."""
-    eval_every: int = 10_000
+    eval_every: int = 2_000
     """Decisions between evaluations."""
     eval_episodes: int = 32
     """Episodes of each evaluation."""
@@ -79,7 +79,7 @@ class Compare:
     """Configurations, separated by commas."""
     seeds: int = 5
     """Training seeds of every configuration, from 0 on."""
-    steps: int = 60_000
+    steps: int = 6_000
     """Decisions of every training run."""
     scenario: str = "mixed"
     """Scenario to train on."""

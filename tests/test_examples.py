@@ -38,6 +38,11 @@ def test_a_few_lines_on_the_zero_flow_map_pick_the_object_up(capsys):
     assert "% of the map in front" in capsys.readouterr().out
 
 
+def test_a_shipped_agent_lifts_the_object(capsys):
+    assert load("05_trained_agent").main()
+    assert "% of the map in front" in capsys.readouterr().out
+
+
 def test_examples_are_short_and_each_has_a_test():
     names = sorted(path.stem for path in EXAMPLES.glob("*.py"))
     tests = Path(__file__).read_text()

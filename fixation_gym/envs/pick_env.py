@@ -183,13 +183,14 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         return np.ascontiguousarray(np.hstack([wrist, front]))
 
     def close(self) -> None:
-        """Free GL contexts and windows; may be called twice."""
+        """Free GL contexts, windows and the simulation; may be called twice. A reset would build them anew."""
         for view in self._views.values():
             view.close()
         self._views = {}
         if self._window is not None:
             self._window.close()
             self._window = None
+        self._sim = None
 
     # -- for checkers, privileged policies and experiments -------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
@@ -69,15 +70,18 @@ class _FixationPickTask(ManipulationEnv):
         return 0.0
 
 
-def build_task(control_frequency: int, extend: SceneExtension | None, looks: bool) -> Any:
-    """Build the task; its ``sim`` holds model and data.
+def build_model(control_frequency: int, extend: SceneExtension | None, looks: bool) -> tuple[Any, Any]:
+    """Build and compile the task.
 
     Args:
         control_frequency: steps per second.
         extend: adds an experiment's own things to the model.
         looks: with the meshes that only people look at; joints and contacts are the same without.
+
+    Returns:
+        ``mjModel`` and ``mjData``.
     """
-    return _FixationPickTask(
+    task: Any = _FixationPickTask(
         extend,
         looks,
         robots="Panda",
@@ -87,6 +91,12 @@ def build_task(control_frequency: int, extend: SceneExtension | None, looks: boo
         control_freq=control_frequency,
         initialization_noise=None,
     )
+    model, data = task.sim.model._model, task.sim.data._data
+    # robosuite's objects refer to each other in circles: until Python looks for those, they would hold this model and a
+    # second one of the robot, together 120 MB for every environment ever made.
+    del task
+    gc.collect()
+    return model, data
 
 
 def make_lift(control_frequency: int, image_size: int | None, hard_reset: bool = True) -> Any:

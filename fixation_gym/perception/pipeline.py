@@ -18,6 +18,7 @@ from fixation_gym.perception.distance_filters import DistanceSettings, DistanceS
 from fixation_gym.perception.fixation_constraint import ConstrainedGaze, ConstraintSettings
 from fixation_gym.perception.following import Frame, follow_constraint, follow_poses, mean_variance, mended
 from fixation_gym.perception.gradients import FlowSettings
+from fixation_gym.perception.opencv_tracking import Window, expected_in, shifted, window_around
 from fixation_gym.perception.optic_flow import (
     Flow,
     estimate_flow,
@@ -27,9 +28,9 @@ from fixation_gym.perception.optic_flow import (
     prepare_grey,
 )
 from fixation_gym.perception.scratch import Scratch
-from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
+from fixation_gym.perception.segmentation import RED, Colour, Segmentation, coloured_pixels, segment
 from fixation_gym.perception.target_motion import InverseDepth, contradiction, target_inverse_depth
-from fixation_gym.perception.tracking import Track, TrackingSettings, expected_at, followed
+from fixation_gym.perception.tracking import Expectation, Track, TrackingSettings, expected_at, followed
 from fixation_gym.perception.zero_flow import (
     Gaze,
     ZeroFlow,
@@ -53,7 +54,7 @@ class PerceptionSettings:
     colour: Colour = RED
     """Colour of the target."""
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    """How far from its expected place the target may be."""
+    """How the target is told from other things of its colour."""
     flow: FlowSettings = field(default_factory=FlowSettings)
     """Resolution, windows and noise of the flow."""
     distance: DistanceSettings = field(default_factory=DistanceSettings)
@@ -128,6 +129,7 @@ class Perception:
         self._state: DistanceState | None = None
         self._constrained: ConstrainedGaze | None = None
         self._track: Track | None = None
+        self._window: Window | None = None
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
         self._covered_time = -math.inf
 
@@ -156,7 +158,7 @@ class Perception:
         zero_flow = self._look_for_obstacles(flow)
         fixation = self._fixation(T_base_cam, segmentation)
         if segmentation.visible:
-            self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
+            self._note(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
         return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam)
 
@@ -173,9 +175,25 @@ class Perception:
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
 
     def _segment(self, observation: Observation, T_base_cam: FloatArray) -> Segmentation:
-        settings = self._settings
-        expected = expected_at(self._track, T_base_cam, observation.time, settings.tracking)
-        return segment(observation.rgb, self._intrinsics, settings.colour, expected.centroid, expected.reach)
+        expected = self._expected(observation, T_base_cam)
+        return segment(observation.rgb, self._intrinsics, self._settings.colour, expected.centroid, expected.reach)
+
+    def _expected(self, observation: Observation, T_base_cam: FloatArray) -> Expectation:
+        """Where the target should be in the image."""
+        tracking = self._settings.tracking
+        if tracking.method == "mean_shift":
+            coloured = coloured_pixels(observation.rgb, self._settings.colour)
+            self._window = None if self._window is None else shifted(self._window, coloured)
+            return expected_in(self._window, coloured, self._intrinsics, observation.time, tracking)
+        return expected_at(self._track, T_base_cam, observation.time, tracking)
+
+    def _note(self, seen: Segmentation, depth: float, T_base_cam: FloatArray, time: float) -> None:
+        """Note where the target is; without tracking it stays unknown."""
+        method = self._settings.tracking.method
+        if method == "camera_motion":
+            self._track = followed(seen, depth, T_base_cam, time)
+        elif method == "mean_shift":
+            self._window = window_around(seen, time)
 
     def _follow(self, now: Frame) -> None:
         """Advance the distance filter to now."""

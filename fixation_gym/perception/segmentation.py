@@ -113,6 +113,12 @@ def segment(
     )
 
 
+def coloured_pixels(rgb: ImageArray, colour: Colour = RED) -> ImageArray:
+    """All pixels of the colour, shape (H, W), 0 or 1, without isolated ones."""
+    height, width = rgb.shape[:2]
+    return _colour_mask(rgb, (slice(0, height), slice(0, width)), colour)
+
+
 def _search_window(rgb: ImageArray, colour: Colour) -> tuple[slice, slice] | None:
     """Rows and columns of the image that can hold the target; None if there is no pixel of its colour.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -19,8 +20,11 @@ from fixation_gym.types import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class TrackingSettings:
-    """How far from its expected place the target may be."""
+    """How the target is told from other things of its colour."""
 
+    method: Literal["camera_motion", "mean_shift", "none"] = "camera_motion"
+    """"camera_motion": it is where it was last seen in base. For comparison, "mean_shift": it is where OpenCV's tracker
+    follows it in the image; "none": it is found anew in every image, as in the first."""
     slack: float = 0.03
     """Offset that is always allowed, normalised coordinates."""
     size_share: float = 1.5

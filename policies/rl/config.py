@@ -32,7 +32,7 @@ class TrainConfig:
     """Name of a configuration."""
     algorithm: str = "sac"
     scenario: str = "mixed"
-    steps: int = 150_000
+    steps: int = 8_000
     """Decisions to learn from, of all worker processes together."""
     seed: int = 0
     workers: int = 4
@@ -40,7 +40,7 @@ class TrainConfig:
     sensor_noise: str = "nominal"
     image_size: tuple[int, int] = (96, 128)
     """Height and width of the wrist image, px; the map's cells lie as those of 240x320."""
-    eval_every: int = 10_000
+    eval_every: int = 2_000
     """Decisions between evaluations."""
     eval_episodes: int = 32
     """Episodes of each evaluation, always the same ones."""
@@ -50,7 +50,7 @@ class TrainConfig:
     """SAC: random decisions before learning begins."""
     gradient_steps: int = 4
     """SAC: per decision of all workers."""
-    buffer_size: int = 150_000
+    buffer_size: int = 50_000
     """SAC: decisions kept."""
 
     @property

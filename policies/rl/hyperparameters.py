@@ -12,7 +12,7 @@ GAMMA = 0.98
 SAC_SETTINGS: dict[str, Any] = {
     "gamma": GAMMA,
     "learning_rate": 5e-4,
-    "batch_size": 256,
+    "batch_size": 128,
     "tau": 0.01,
     "train_freq": 1,
     "gradient_steps": 0,  # those of policies.rl.overlap take place while the environments step

@@ -8,6 +8,7 @@ from fixation_gym.control.gaze import GazeGains
 from fixation_gym.perception.evidence_map import ZeroFlowSettings
 from fixation_gym.perception.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.pipeline import PerceptionSettings
+from fixation_gym.perception.tracking import TrackingSettings
 from policies.servo.gains import ServoGains
 
 
@@ -42,6 +43,16 @@ VARIANTS: tuple[ServoVariant, ...] = (
         "servo:hard_filter",
         "distance from poses: the paper's fixation constraint on the measured twist gives it",
         perception=PerceptionSettings(constraint=ConstraintSettings()),
+    ),
+    ServoVariant(
+        "servo:no_tracking",
+        "tracking: every image is segmented like the first",
+        perception=PerceptionSettings(tracking=TrackingSettings(method="none")),
+    ),
+    ServoVariant(
+        "servo:opencv_tracker",
+        "the camera's motion when the target is tracked: OpenCV's mean shift follows it in the image",
+        perception=PerceptionSettings(tracking=TrackingSettings(method="mean_shift")),
     ),
     ServoVariant("servo:no_retry", "one grasp only", gains=ServoGains(max_grasps=1)),
 )

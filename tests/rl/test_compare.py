@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -80,10 +81,21 @@ def test_seeds_can_be_added_but_not_other_training(tmp_path):
         compare(replace(CONFIG, training=TrainConfig(steps=5)), tmp_path, run_fake_cell)
 
 
+@pytest.fixture
+def local_ray(monkeypatch):
+    """A Ray cluster on this machine, whose workers can import this file."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    import ray
+
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+    yield
+    ray.shutdown()
+
+
 @pytest.mark.parametrize("backend", ["loky", "ray"])
-def test_a_backend_finds_what_this_process_finds(tmp_path, backend):
+def test_a_backend_finds_what_this_process_finds(tmp_path, backend, request):
     if backend == "ray":
-        pytest.importorskip("ray")
+        request.getfixturevalue("local_ray")
     here = compare(CONFIG, tmp_path / "here", run_fake_cell)
     there = compare(replace(CONFIG, workers=2, backend=backend), tmp_path / "there", run_fake_cell)
     for part in ("table", "curves", "runs"):

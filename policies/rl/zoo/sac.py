@@ -12,7 +12,7 @@ hyperparams: dict[str, dict[str, Any]] = {
         "policy": "MultiInputPolicy",
         "env_wrapper": "policies.rl.decisions.DecisionEnv",
         "env_kwargs": {"scenario": "mixed", "observation": "zfc", "image_size": (96, 128)},
-        "n_timesteps": 60_000,
+        "n_timesteps": 8_000,
         "n_envs": 4,
         "buffer_size": 100_000,
         "learning_starts": 1000,

@@ -1,0 +1,1 @@
+"""Trained agents that come with the package; README.md here says how they were made."""

@@ -1,0 +1,35 @@
+"""A closed environment leaves nothing behind: evaluations open one after the other in a process."""
+
+import gc
+
+import gymnasium
+import pytest
+
+import fixation_gym  # noqa: F401
+
+pytestmark = pytest.mark.sim
+HEAVY = ("PickSim", "TaskModel", "View", "_FixationPickTask", "MjModel", "MjData", "MjrContext", "GLContext")
+
+
+def heavy_objects():
+    """Models, data and GL contexts that this process holds, also those that only refer to each other."""
+    return sum(type(thing).__name__ in HEAVY for thing in gc.get_objects())
+
+
+def test_a_closed_environment_frees_models_and_contexts():
+    gc.collect()
+    before = heavy_objects()
+    env = gymnasium.make("FixationPick-v0", scenario="mirror", image_size=(32, 32))
+    env.reset(seed=0)
+    assert heavy_objects() > before
+    env.close()
+    assert heavy_objects() == before
+
+
+def test_a_closed_environment_can_be_reset_again():
+    env = gymnasium.make("FixationPick-v0", image_size=(32, 32))
+    first, _ = env.reset(seed=3)
+    env.close()
+    again, _ = env.reset(seed=3)
+    assert (first["rgb"] == again["rgb"]).all()
+    env.close()
