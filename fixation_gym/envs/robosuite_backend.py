@@ -93,7 +93,7 @@ def build_model(control_frequency: int, extend: SceneExtension | None, looks: bo
     )
     model, data = task.sim.model._model, task.sim.data._data
     # robosuite's objects refer to each other in circles: until Python looks for those, they would hold this model and a
-    # second one of the robot, together 120 MB for every environment ever made.
+    # second one of the robot, together some 100 MB for every environment made.
     del task
     gc.collect()
     return model, data

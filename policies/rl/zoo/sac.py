@@ -14,7 +14,7 @@ hyperparams: dict[str, dict[str, Any]] = {
         "env_kwargs": {"scenario": "mixed", "observation": "zfc", "image_size": (96, 128)},
         "n_timesteps": 8_000,
         "n_envs": 4,
-        "buffer_size": 100_000,
+        "buffer_size": 50_000,
         "learning_starts": 1000,
         "gradient_steps": -1,
     }
