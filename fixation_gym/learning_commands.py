@@ -88,7 +88,7 @@ class Compare:
     episodes: int = 50
     """Episodes per test scenario and agent; the same for all."""
     quick: bool = False
-    """Two seeds of zfc and blind, 1000 decisions each, 8 episodes: minutes, to see that everything works."""
+    """Two seeds of zfc and blind, 600 decisions each, 8 episodes: minutes, to see that everything works."""
     env_workers: int = 4
     """Processes that step the environments of one training run."""
     workers: int = 1

@@ -110,7 +110,7 @@ SCENARIOS: dict[str, Scenario] = {
     for scenario in (
         Scenario("clear"),
         Scenario("opaque", ("opaque",), (1, 3)),
-        Scenario("translucent", ("translucent",), (1, 3)),
+        Scenario("translucent", ("translucent",), (2, 3)),
         Scenario("mirror", ("mirror",), (1, 1)),
         Scenario("line_of_sight", ("translucent", "wire"), (1, 2), view_elevation_deg=(28.0, 38.0), through_sight=True),
         Scenario("moving_obstacle", ("opaque", "translucent"), (1, 2), obstacle_motions=("driven", "pushed")),

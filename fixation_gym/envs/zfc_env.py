@@ -143,7 +143,7 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         action = checked_action(action, 4)
         now = self._moment
         if self._manoeuvre is None and action[3] > 0.0 and now.percept.fixation.initialised:
-            point, time = now.percept.fixation.point_base, now.reading.time
+            point, time = now.percept.centre_base, now.reading.time
             self._manoeuvre = open_loop.begin_grasp(now.T_base_cam, point, TABLE_HEIGHT, time, _OPEN_LOOP)
         if self._manoeuvre is not None:
             twist = open_loop.manoeuvre_twist(self._manoeuvre, now.T_base_cam, _OPEN_LOOP)

@@ -29,8 +29,10 @@ from fixation_gym.perception.optic_flow import (
 )
 from fixation_gym.perception.scratch import Scratch
 from fixation_gym.perception.segmentation import RED, Colour, Segmentation, coloured_pixels, segment
+from fixation_gym.perception.target_centre import CentreSettings, TargetBody, with_outline
 from fixation_gym.perception.target_motion import InverseDepth, contradiction, target_inverse_depth
 from fixation_gym.perception.tracking import Expectation, Track, TrackingSettings, expected_at, followed
+from fixation_gym.perception.upright_body import UprightBody
 from fixation_gym.perception.zero_flow import (
     Gaze,
     ZeroFlow,
@@ -62,6 +64,9 @@ class PerceptionSettings:
     constraint: ConstraintSettings | None = None
     """If given, the distance comes from the paper's fixation constraint on the measured twist, for comparison; neither
     poses and centroids nor the target's own motion have a say in it."""
+    centre: CentreSettings | None = field(default_factory=CentreSettings)
+    """How the centre of the target's body is found; None: the fixated point is taken for it. Needs a support height,
+    and is left out with ``constraint``."""
     zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
     """Margins and gates of the zero-flow test."""
     max_gap_s: float = 0.15
@@ -84,6 +89,13 @@ class Percept:
     """Where the fixated object is now."""
     T_base_cam: FloatArray
     """Camera pose in base at the time of ``flow`` and ``zfc``, shape (4, 4)."""
+    body: UprightBody | None = None
+    """The body whose surface is fixated; None while its centre is not sure."""
+
+    @property
+    def centre_base(self) -> FloatArray:
+        """Centre of the target in base, shape (3,), m: of its body if that is known, else the fixated point."""
+        return self.fixation.point_base if self.body is None else self.body.centre
 
 
 class Perception:
@@ -132,6 +144,7 @@ class Perception:
         self._window: Window | None = None
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
         self._covered_time = -math.inf
+        self._body = TargetBody()
 
     @property
     def flow_intrinsics(self) -> Intrinsics:
@@ -160,7 +173,8 @@ class Perception:
         if segmentation.visible:
             self._note(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
-        return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam)
+        body = self._fit_body(frame, fixation)
+        return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam, body)
 
     def _check(self, observation: Observation) -> None:
         expected = (self._intrinsics.height, self._intrinsics.width, 3)
@@ -200,8 +214,11 @@ class Perception:
         settings = self._settings
         before = self._frames[-1] if self._frames else None
         if settings.constraint is None:
+            anchor = None if self._state is None else self._state.T_base_anchor
             self._state, covering = follow_poses(self._state, before, now, settings.distance)
             self._covered_time = now.time if covering else self._covered_time
+            if self._state is not None and self._state.T_base_anchor is not anchor:
+                self._body = TargetBody()  # the filter began anew: the target moved
             return
         self._state, self._constrained = follow_constraint(
             self._state, self._constrained, before, now, settings.distance, settings.constraint
@@ -212,6 +229,16 @@ class Perception:
         if not seen.visible:
             return distance.fixation_at(self._state, T_base_cam, settings)
         return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance(seen))
+
+    def _fit_body(self, now: Frame, fixation: Fixation) -> UprightBody | None:
+        """The target's body, with the outline of this frame if nothing covers it."""
+        settings, height = self._settings.centre, self.support_height_m
+        if settings is None or height is None or self._settings.constraint is not None:
+            return None
+        if now.time - self._covered_time >= _COVERED_S:
+            seen, T_base_cam = now.segmentation, now.T_base_cam
+            self._body = with_outline(self._body, seen, fixation, self._intrinsics, T_base_cam, height, settings)
+        return self._body.believed(now.T_base_cam, settings)
 
     def _inverse_distance(self, T_base_cam: FloatArray) -> InverseDepth:
         """Of the fixated object for a camera; 0 before it was seen."""
@@ -265,6 +292,7 @@ class Perception:
         if own is not None:
             self._state = mended(own, middle, last, self._settings.distance)
             self._own_depths.clear()
+            self._body = TargetBody()
 
 
 @lru_cache(maxsize=1)

@@ -24,7 +24,7 @@ SERVO = "servo"
 
 CellKey = tuple[str, int]
 """(configuration, seed)"""
-QUICK = TrainConfig(steps=1000, eval_every=500, eval_episodes=8, learning_starts=200, buffer_size=2000)
+QUICK = TrainConfig(steps=600, eval_every=300, eval_episodes=8, learning_starts=200, buffer_size=2000)
 
 
 @dataclass(frozen=True)

@@ -89,8 +89,12 @@ class ServoPolicy:
         self._advance(percept, observation, T_base_cam, obstacle)
         fixation = percept.fixation
         phase = self._phase if self._manoeuvre is None else self._manoeuvre.stage
-        distance = fixation.distance_m if fixation.initialised else math.nan
-        self.estimate = Estimate(distance, fixation.distance_std_m, phase.value)
+        distance = (fixation.distance_m, fixation.distance_std_m)
+        if percept.body is not None:
+            distance = percept.body.depth(T_base_cam)
+        elif not fixation.initialised:
+            distance = (math.nan, fixation.distance_std_m)
+        self.estimate = Estimate(*distance, phase.value)
         return Command(self._twist(percept, T_base_cam, obstacle), open_loop.gripper_command(self._manoeuvre))
 
     # -- obstacles -----------------------------------------------------------------------------------------------
@@ -154,7 +158,7 @@ class ServoPolicy:
     def _begin_grasp(self, percept: Percept, T_base_cam: FloatArray) -> Manoeuvre:
         gains = self.gains.open_loop
         support = self._perception.support_height_m
-        return open_loop.begin_grasp(T_base_cam, percept.fixation.point_base, support, percept.time, gains)
+        return open_loop.begin_grasp(T_base_cam, percept.centre_base, support, percept.time, gains)
 
     # -- laws ----------------------------------------------------------------------------------------------------
 

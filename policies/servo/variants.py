@@ -54,6 +54,11 @@ VARIANTS: tuple[ServoVariant, ...] = (
         "the camera's motion when the target is tracked: OpenCV's mean shift follows it in the image",
         perception=PerceptionSettings(tracking=TrackingSettings(method="mean_shift")),
     ),
+    ServoVariant(
+        "servo:no_body",
+        "the body fitted to outlines: the middle of the surface in view counts as the target's centre",
+        perception=PerceptionSettings(centre=None),
+    ),
     ServoVariant("servo:no_retry", "one grasp only", gains=ServoGains(max_grasps=1)),
 )
 VARIANT_NAMES = tuple(variant.name for variant in VARIANTS)

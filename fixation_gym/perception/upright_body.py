@@ -1,0 +1,178 @@
+"""A body that stands upright on a table, fitted to the outlines that a moving camera sees of it.
+
+The centroid that is tracked is that of the visible surface: from steeply above the top's, a centimetre or more above
+the centre of the body. An outline tells more. Each of its tangents spans a plane with the camera centre that touches
+the body, and planes from many sides, with the table below, leave little choice. A convex body is what its support
+function says, the distance from the centre to the touching plane with normal n. For half sizes a, b, c it is here
+
+    g(n) = ((A^p + B^p)^(q/p) + C^q)^(1/q),   A = a |n_x|, B = b |n_y|, C = c |n_z|  (x, y turned by the yaw)
+
+which is exact for boxes (p = q = 1), elliptic cylinders (2, 1) and ellipsoids (2, 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.optimize import least_squares
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.types import FloatArray, MaskArray
+
+TANGENTS = 24
+"""Tangents taken of every outline."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodySettings:
+    """Noise of outlines, and what bodies to expect before any was seen."""
+
+    outline_std_px: float = 0.6
+    """Error of an outline, px."""
+    half_size_m: float = 0.027
+    """Half size along each axis to expect, m."""
+    log_size_std: float = 0.5
+    """Standard deviation of its logarithm."""
+    position_std_m: float = 0.03
+    """How far the centre may be from the point that the centroid says, m."""
+    model_std_m: float = 5e-4
+    """Error of the centre because no body is exactly of this kind, m."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outline:
+    """Tangents of one outline as planes through the camera centre; n of them."""
+
+    origin: FloatArray
+    """Camera centre in base, shape (3,), m."""
+    normals: FloatArray
+    """Outward normals in base, shape (n, 3), scaled so that n . (X - origin) / depth is in normalised coordinates."""
+    depth: float
+    """Depth of the body along the optical axis, m."""
+    pixel: float
+    """Size of a pixel in normalised coordinates."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UprightBody:
+    """The fitted body."""
+
+    centre: FloatArray
+    """In base, shape (3,), m."""
+    centre_cov: FloatArray
+    """Covariance of ``centre``, shape (3, 3), m^2."""
+    parameters: FloatArray
+    """x, y, yaw, logarithms of the half sizes a, b, c, and arcsines of 2 p - 3 and 2 q - 3, shape (8,)."""
+
+    @property
+    def half_sizes(self) -> FloatArray:
+        """a, b, c, shape (3,), m."""
+        return np.exp(self.parameters[3:6])
+
+    def depth(self, T_base_cam: FloatArray) -> tuple[float, float]:
+        """Depth of the centre along a camera's optical axis and its standard deviation, m."""
+        axis = T_base_cam[:3, 2]
+        return float(axis @ (self.centre - T_base_cam[:3, 3])), float(np.sqrt(axis @ self.centre_cov @ axis))
+
+
+def outline_of(mask: MaskArray, intrinsics: Intrinsics, T_base_cam: FloatArray, depth: float) -> Outline:
+    """Outline of a mask, shape (H, W), which must not be empty, seen from T_base_cam, shape (4, 4)."""
+    contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    hull = cv2.convexHull(np.concatenate(contours)).reshape(-1, 2).astype(np.float64)
+    reach = (intrinsics.normalise(hull) @ _DIRECTIONS.T).max(axis=0) + 0.5 / intrinsics.fx
+    normals = np.column_stack([_DIRECTIONS, -reach]) @ T_base_cam[:3, :3].T
+    return Outline(T_base_cam[:3, 3].copy(), normals, depth, 1.0 / intrinsics.fx)
+
+
+def misfit(body: UprightBody, outline: Outline, support_height: float) -> FloatArray:
+    """By how much each tangent of the body lies outside the outline's, shape (n,), px."""
+    planes = _Planes.of([outline])
+    return planes.misfit(body.parameters, support_height) / outline.pixel
+
+
+def fit_upright_body(
+    outlines: Sequence[Outline],
+    point: FloatArray,
+    support_height: float,
+    settings: BodySettings,
+    start: UprightBody | None = None,
+) -> UprightBody:
+    """Most probable body (robust, since parts of an outline may be covered).
+
+    Args:
+        outlines: at least one.
+        point: about where the body is, in base, shape (3,), m.
+        support_height: height of the table in base, m.
+        settings: noise and prior.
+        start: an earlier fit to begin from; None tries several yaws.
+    """
+    expected = np.array([point[0], point[1], 0.0, *np.full(3, np.log(settings.half_size_m)), 0.0, 0.0])
+    if start is not None:
+        expected[2] = start.parameters[2]
+    spread = np.array([settings.position_std_m] * 2 + [1.0] + [settings.log_size_std] * 3 + [2.0, 2.0])
+    planes = _Planes.of(outlines)
+    noise = planes.pixel * settings.outline_std_px
+
+    def residuals(parameters: FloatArray) -> FloatArray:
+        return np.concatenate([planes.misfit(parameters, support_height) / noise, (parameters - expected) / spread])
+
+    def solution(first: FloatArray, evaluations: int):
+        return least_squares(residuals, first, x_scale=spread, loss="soft_l1", f_scale=2.0, max_nfev=evaluations)
+
+    if start is not None:
+        found = solution(start.parameters, 12)
+    else:
+        turned = [expected + np.eye(8)[2] * yaw for yaw in (0.0, np.pi / 6, np.pi / 3)]
+        found = min((solution(first, 60) for first in turned), key=lambda result: result.cost)
+    return _body(found.x, found.jac, support_height, settings)
+
+
+def _body(parameters: FloatArray, jacobian: FloatArray, support_height: float, settings: BodySettings) -> UprightBody:
+    cov = np.linalg.inv(jacobian.T @ jacobian)
+    height = float(np.exp(parameters[5]))
+    by_parameters = np.zeros((3, 8))
+    by_parameters[0, 0] = by_parameters[1, 1] = 1.0
+    by_parameters[2, 5] = height
+    centre = np.array([parameters[0], parameters[1], support_height + height])
+    centre_cov = by_parameters @ cov @ by_parameters.T + settings.model_std_m**2 * np.eye(3)
+    return UprightBody(centre, centre_cov, parameters)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Planes:
+    """Tangents of several outlines in one array each; n in all."""
+
+    origin: FloatArray
+    normals: FloatArray
+    depth: FloatArray
+    pixel: FloatArray
+
+    @classmethod
+    def of(cls, outlines: Sequence[Outline]) -> _Planes:
+        counts = [len(outline.normals) for outline in outlines]
+        return cls(
+            np.repeat([outline.origin for outline in outlines], counts, axis=0),
+            np.concatenate([outline.normals for outline in outlines]),
+            np.repeat([outline.depth for outline in outlines], counts),
+            np.repeat([outline.pixel for outline in outlines], counts),
+        )
+
+    def misfit(self, parameters: FloatArray, support_height: float) -> FloatArray:
+        """By how much each tangent of the body lies outside the outline's, shape (n,), normalised coordinates."""
+        x, y, yaw = parameters[:3]
+        a, b, c = np.exp(np.clip(parameters[3:6], -7.0, 0.0))
+        p, q = 1.5 + 0.5 * np.sin(parameters[6:])  # both ends can be reached
+        nx, ny, nz = self.normals.T
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        along, across = a * np.abs(cos * nx + sin * ny), b * np.abs(cos * ny - sin * nx)
+        flat = (along**p + across**p) ** (q / p)
+        reach = (flat + (c * np.abs(nz)) ** q) ** (1.0 / q)
+        offset = np.array([x, y, support_height + c]) - self.origin
+        return (np.einsum("ij,ij->i", self.normals, offset) + reach) / self.depth
+
+
+_ANGLES = 2.0 * np.pi * np.arange(TANGENTS) / TANGENTS
+_DIRECTIONS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])

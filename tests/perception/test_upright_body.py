@@ -1,0 +1,106 @@
+"""An upright body from its outlines: centre, size and kind of drawn bodies whose truth is known."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import look_at
+from fixation_gym.perception.upright_body import BodySettings, UprightBody, fit_upright_body, misfit, outline_of
+
+CAMERA = Intrinsics.from_fovy(240, 320, np.radians(42.5))
+TABLE = 0.1
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def surface(kind, half_sizes, yaw, centre):
+    """Points whose convex hull is the body, shape (n, 3), m."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    if kind == "box":
+        points = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    elif kind == "cylinder":
+        points = np.array([(np.cos(a), np.sin(a), z) for a in angles for z in (-1, 1)])
+    else:
+        latitudes = np.linspace(-np.pi / 2, np.pi / 2, 41)
+        points = np.array(
+            [(np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)) for a in angles for b in latitudes]
+        )
+    c, s = np.cos(yaw), np.sin(yaw)
+    return centre + (points * half_sizes) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def mask_of(points, T_base_cam):
+    """What the camera sees of the body, drawn to a sixteenth of a pixel, shape (240, 320)."""
+    pixels = CAMERA.project((points - T_base_cam[:3, 3]) @ T_base_cam[:3, :3])
+    hull = cv2.convexHull(pixels.astype(np.float32)).reshape(-1, 2)
+    fine = np.zeros((240 * 8, 320 * 8), np.uint8)
+    cv2.fillConvexPoly(fine, np.rint((hull + 0.5) * 8 - 0.5).astype(np.int32), 255)
+    return np.asarray(cv2.resize(fine, (320, 240), interpolation=cv2.INTER_AREA)) > 127
+
+
+def approach(target):
+    """Camera poses of an approach that climbs from 45 to 72 degrees, as the servo's."""
+    poses = []
+    for share in np.linspace(0.0, 1.0, 14):
+        elevation, distance = np.radians(45.0 + 27.0 * share), 0.45 - 0.28 * share
+        azimuth = 0.6 + 0.1 * np.sin(8.0 * share)
+        direction = np.array(
+            [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
+        )
+        poses.append(look_at(target + distance * direction, target, UP))
+    return poses
+
+
+def fitted(points, centre, poses, guess_error=(0.01, -0.01, 0.01)) -> tuple[UprightBody, list]:
+    outlines = [
+        outline_of(mask_of(points, pose), CAMERA, pose, float(pose[:3, 2] @ (centre - pose[:3, 3]))) for pose in poses
+    ]
+    return fit_upright_body(outlines, centre + guess_error, TABLE, BodySettings()), outlines
+
+
+BODIES = [
+    ("box", (0.02, 0.02, 0.03), 0.4),
+    ("box", (0.035, 0.025, 0.035), 1.2),
+    ("cylinder", (0.03, 0.03, 0.04), 0.0),
+    ("cylinder", (0.015, 0.015, 0.02), 0.0),
+    ("ellipsoid", (0.03, 0.03, 0.03), 0.0),
+    ("ellipsoid", (0.04, 0.03, 0.025), -0.7),
+]
+
+
+@pytest.mark.parametrize(("kind", "half_sizes", "yaw"), BODIES)
+def test_centre_of_a_drawn_body_to_a_millimetre(kind, half_sizes, yaw):
+    centre = np.array([0.5, -0.1, TABLE + half_sizes[2]])
+    body, _ = fitted(surface(kind, half_sizes, yaw, centre), centre, approach(centre))
+    assert np.linalg.norm(body.centre - centre) < 0.001
+    assert body.half_sizes[2] == pytest.approx(half_sizes[2], abs=0.001)
+    error = body.centre - centre
+    assert error @ np.linalg.solve(body.centre_cov, error) < 11.3  # 99 % of chi-square with 3 degrees of freedom
+
+
+def test_cut_outlines_do_not_draw_the_centre_away():
+    half_sizes = (0.025, 0.025, 0.035)
+    centre = np.array([0.5, -0.1, TABLE + half_sizes[2]])
+    points, poses = surface("box", half_sizes, 0.3, centre), approach(centre)
+    outlines = []
+    for index, pose in enumerate(poses):
+        mask = mask_of(points, pose)
+        if index in (3, 4):  # something covers the left half
+            mask[:, : int(np.flatnonzero(mask.any(axis=0)).mean())] = False
+        outlines.append(outline_of(mask, CAMERA, pose, float(pose[:3, 2] @ (centre - pose[:3, 3]))))
+    body = fit_upright_body(outlines, centre, TABLE, BodySettings())
+    assert np.linalg.norm(body.centre - centre) < 0.002
+    assert np.abs(misfit(body, outlines[3], TABLE)).max() > 5.0
+    assert np.abs(misfit(body, outlines[-1], TABLE)).max() < 1.5
+
+
+def test_depth_of_the_centre_with_its_standard_deviation():
+    centre = np.array([0.5, -0.1, 0.13])
+    pose = approach(centre)[-1]
+    body = UprightBody(centre, np.diag([1e-6, 1e-6, 4e-6]), np.zeros(8))
+    depth, std = body.depth(pose)
+    axis = pose[:3, 2]
+    assert depth == pytest.approx(np.linalg.norm(centre - pose[:3, 3]))
+    assert std == pytest.approx(np.sqrt(1e-6 * (axis[0] ** 2 + axis[1] ** 2) + 4e-6 * axis[2] ** 2))
