@@ -45,7 +45,9 @@ class OpenLoopGains:
     """Largest distance that it stays back, m."""
     tool_tolerance: float = 0.004
     """Distance at which the tool has arrived, m."""
-    finger_room: float = 0.016
+    grasp_height: float = 0.85
+    """Height of the grasp above the support surface as a share of the point's: many things are widest below it."""
+    finger_room: float = 0.011
     """Least height of the tool above the support surface, m."""
     grasp_timeout: float = 4.0
     """A motion that takes longer has failed, s."""
@@ -75,18 +77,18 @@ class Manoeuvre:
 def begin_grasp(
     T_base_cam: FloatArray, point: FloatArray, support_height: float | None, time: float, gains: OpenLoopGains
 ) -> Manoeuvre:
-    """Start the grasp of what is fixated.
+    """Start the grasp of the target.
 
     Args:
         T_base_cam: camera pose, shape (4, 4); the hand keeps its orientation.
-        point: fixated point in base, shape (3,), m.
+        point: centre of the target in base, shape (3,), m.
         support_height: height of the table in base, m; None if unknown.
         time: s.
         gains: numbers of the manoeuvre.
     """
     point = point.copy()
     if support_height is not None:
-        point[2] = max(point[2], support_height + gains.finger_room)
+        point[2] = support_height + max(gains.grasp_height * (point[2] - support_height), gains.finger_room)
     return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA)
 
 

@@ -214,11 +214,8 @@ class Perception:
         settings = self._settings
         before = self._frames[-1] if self._frames else None
         if settings.constraint is None:
-            anchor = None if self._state is None else self._state.T_base_anchor
             self._state, covering = follow_poses(self._state, before, now, settings.distance)
             self._covered_time = now.time if covering else self._covered_time
-            if self._state is not None and self._state.T_base_anchor is not anchor:
-                self._body = TargetBody()  # the filter began anew: the target moved
             return
         self._state, self._constrained = follow_constraint(
             self._state, self._constrained, before, now, settings.distance, settings.constraint
@@ -231,14 +228,13 @@ class Perception:
         return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance(seen))
 
     def _fit_body(self, now: Frame, fixation: Fixation) -> UprightBody | None:
-        """The target's body, with the outline of this frame if nothing covers it."""
+        """The target's body, with the outline of this frame."""
         settings, height = self._settings.centre, self.support_height_m
         if settings is None or height is None or self._settings.constraint is not None:
             return None
-        if now.time - self._covered_time >= _COVERED_S:
-            seen, T_base_cam = now.segmentation, now.T_base_cam
-            self._body = with_outline(self._body, seen, fixation, self._intrinsics, T_base_cam, height, settings)
-        return self._body.believed(now.T_base_cam, settings)
+        seen, T_base_cam = now.segmentation, now.T_base_cam
+        self._body = with_outline(self._body, seen, fixation, self._intrinsics, T_base_cam, height, settings)
+        return self._body.believed(T_base_cam, settings)
 
     def _inverse_distance(self, T_base_cam: FloatArray) -> InverseDepth:
         """Of the fixated object for a camera; 0 before it was seen."""
@@ -292,7 +288,6 @@ class Perception:
         if own is not None:
             self._state = mended(own, middle, last, self._settings.distance)
             self._own_depths.clear()
-            self._body = TargetBody()
 
 
 @lru_cache(maxsize=1)

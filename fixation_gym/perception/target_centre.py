@@ -1,8 +1,8 @@
-"""The centre of the target's body: which outlines are kept, and when they are too old to be true."""
+"""The centre of the target's body: which outlines are kept, and when they are no longer true."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,12 +10,16 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.distance_filters import Fixation
 from fixation_gym.perception.segmentation import Segmentation
 from fixation_gym.perception.upright_body import (
+    TANGENTS,
+    BodyPrior,
     BodySettings,
     Outline,
     UprightBody,
     fit_upright_body,
     misfit,
+    moved_body,
     outline_of,
+    unknown_body,
 )
 from fixation_gym.types import FloatArray
 
@@ -28,16 +32,20 @@ class CentreSettings:
     """Noise of outlines and prior of the body."""
     baseline: float = 0.05
     """A new outline is kept when the camera moved by this share of the distance."""
+    least_outlines: int = 6
+    """A body is fitted first when there are so many."""
     max_outlines: int = 32
     """When there are more, every second of the older half goes."""
-    least_outlines: int = 6
-    """A body is believed when this many outlines made it."""
-    largest_misfit_px: float = 3.0
-    """A body that misses the newest outline by more, in the median, is another one, or has moved."""
+    contradiction_px: float = 3.0
+    """A tangent that is seen farther out than the body reaches contradicts it, one farther in is covered."""
+    moved_share: float = 0.1
+    """If this share of an outline contradicts the body, that has moved, or is another one."""
+    moved_misfit_px: float = 1.5
+    """A known body that was moved fits its first outline as well as this, in the median."""
+    doubts: int = 25
+    """The body is forgotten after so many frames in a row in which half of the outline is missing."""
     believed_std_m: float = 0.006
     """Standard deviation of the centre along the optical axis up to which it is believed."""
-    distance_relative_std: float = 0.1
-    """Outlines are kept when the distance is known as well as this."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,12 +54,16 @@ class TargetBody:
 
     outlines: tuple[Outline, ...] = ()
     body: UprightBody | None = None
+    prior: BodyPrior | None = None
+    """What is known of a body that has moved; None: nothing but what the outlines say."""
+    doubts: int = 0
+    """Frames in a row in which half of the outline was missing."""
 
     def believed(self, T_base_cam: FloatArray, settings: CentreSettings) -> UprightBody | None:
         """The body, if its depth from this camera is sure enough."""
-        if self.body is None or len(self.outlines) < settings.least_outlines:
+        if self.body is None or self.body.depth(T_base_cam)[1] > settings.believed_std_m:
             return None
-        return self.body if self.body.depth(T_base_cam)[1] < settings.believed_std_m else None
+        return self.body
 
 
 def with_outline(
@@ -63,7 +75,10 @@ def with_outline(
     support_height: float,
     settings: CentreSettings,
 ) -> TargetBody:
-    """Take in the target's outline, if it is all in the image and seen from a new place.
+    """Take in how the target is seen in a frame.
+
+    What covers the target makes its outline smaller, never larger. So an outline that reaches beyond the body says that
+    the body moved, or was covered when it was fitted; where an outline falls short something covers it.
 
     Args:
         known: what outlines said before.
@@ -74,20 +89,61 @@ def with_outline(
         support_height: height of the table in base, m.
         settings: of what to keep.
     """
-    depth = fixation.distance_m
-    if not seen.whole or fixation.distance_std_m > settings.distance_relative_std * depth:
+    if not seen.visible:
         return known
-    if known.outlines:
-        moved = np.linalg.norm(T_base_cam[:3, 3] - known.outlines[-1].origin)
-        if moved < settings.baseline * depth:
-            return known
-    newest = outline_of(seen.mask, intrinsics, T_base_cam, depth)
+    newest = outline_of(seen.mask, intrinsics, T_base_cam, fixation.distance_m)
+    if known.body is not None:
+        excess = misfit(known.body, newest, support_height)
+        if np.count_nonzero(excess < -settings.contradiction_px) > settings.moved_share * TANGENTS:
+            ray = T_base_cam[:3, :3] @ np.array([*fixation.centroid, 1.0])
+            return _moved(known, known.body, newest, ray, support_height, settings)
+        newest = replace(newest, normals=newest.normals[excess < settings.contradiction_px])
+    if len(newest.normals) < TANGENTS / 2:
+        doubts = known.doubts + 1
+        return replace(known, doubts=doubts) if doubts < settings.doubts else TargetBody()
+    if not _is_new_view(known.outlines, T_base_cam, settings.baseline * fixation.distance_m):
+        return replace(known, doubts=0)
     outlines = (*_thinned(known.outlines, settings.max_outlines), newest)
-    body = fit_upright_body(outlines, fixation.point_base, support_height, settings.body, known.body)
-    if float(np.median(np.abs(misfit(body, newest, support_height)))) > settings.largest_misfit_px:
-        outlines = (newest,)
-        body = fit_upright_body(outlines, fixation.point_base, support_height, settings.body)
-    return TargetBody(outlines, body)
+    if known.body is None and len(outlines) < settings.least_outlines:
+        return TargetBody(outlines)
+    prior = known.prior or unknown_body(fixation.point_base, settings.body)
+    if known.body is not None:
+        prior.mean[2] = known.body.parameters[2]  # no yaw is more likely than another
+    body = fit_upright_body(outlines, prior, support_height, settings.body, known.body)
+    return TargetBody(outlines, body, known.prior)
+
+
+def _moved(
+    known: TargetBody,
+    body: UprightBody,
+    newest: Outline,
+    ray: FloatArray,
+    support_height: float,
+    settings: CentreSettings,
+) -> TargetBody:
+    """The same body elsewhere, if that fits; else all begins anew.
+
+    Args:
+        known: what outlines said before.
+        body: as it was.
+        newest: its outline now.
+        ray: direction in base in which it is seen, shape (3,).
+        support_height: height of the table in base, m.
+        settings: how well it must fit.
+    """
+    if ray[2] > -1e-3:
+        return TargetBody((newest,))
+    point = newest.origin + ray * (body.centre[2] - newest.origin[2]) / ray[2]
+    parameters = body.parameters if known.prior is None else known.prior.mean
+    prior = moved_body(parameters, point, settings.body)
+    found = fit_upright_body((newest,), prior, support_height, settings.body, replace(body, parameters=prior.mean))
+    if float(np.median(np.abs(misfit(found, newest, support_height)))) > settings.moved_misfit_px:
+        return TargetBody((newest,))
+    return TargetBody((newest,), found, prior)
+
+
+def _is_new_view(outlines: tuple[Outline, ...], T_base_cam: FloatArray, baseline: float) -> bool:
+    return not outlines or bool(np.linalg.norm(T_base_cam[:3, 3] - outlines[-1].origin) > baseline)
 
 
 def _thinned(outlines: tuple[Outline, ...], most: int) -> tuple[Outline, ...]:

@@ -36,8 +36,10 @@ class BodySettings:
     """Half size along each axis to expect, m."""
     log_size_std: float = 0.5
     """Standard deviation of its logarithm."""
+    moved_log_size_std: float = 0.05
+    """The same of a body whose size is known and that was moved."""
     position_std_m: float = 0.03
-    """How far the centre may be from the point that the centroid says, m."""
+    """How far the centre may be from where it is expected, m."""
     model_std_m: float = 5e-4
     """Error of the centre because no body is exactly of this kind, m."""
 
@@ -78,12 +80,43 @@ class UprightBody:
         return float(axis @ (self.centre - T_base_cam[:3, 3])), float(np.sqrt(axis @ self.centre_cov @ axis))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyPrior:
+    """What is expected of a body's parameters: mean and standard deviation, shape (8,) each."""
+
+    mean: FloatArray
+    std: FloatArray
+
+
+def unknown_body(point: FloatArray, settings: BodySettings) -> BodyPrior:
+    """Prior of a body of which nothing is known but about where it is in base, shape (3,), m."""
+    sizes = [np.log(settings.half_size_m)] * 3
+    stds = [settings.position_std_m] * 2 + [1.0] + [settings.log_size_std] * 3 + [2.0, 2.0]
+    return BodyPrior(np.array([point[0], point[1], 0.0, *sizes, 0.0, 0.0]), np.array(stds))
+
+
+def moved_body(parameters: FloatArray, point: FloatArray, settings: BodySettings) -> BodyPrior:
+    """Prior of a known body that was moved to about this place in base, shape (3,), m."""
+    stds = [settings.position_std_m] * 2 + [1.0] + [settings.moved_log_size_std] * 3 + [0.2, 0.2]
+    return BodyPrior(np.array([point[0], point[1], *parameters[2:]]), np.array(stds))
+
+
 def outline_of(mask: MaskArray, intrinsics: Intrinsics, T_base_cam: FloatArray, depth: float) -> Outline:
-    """Outline of a mask, shape (H, W), which must not be empty, seen from T_base_cam, shape (4, 4)."""
+    """Outline of a mask, without tangents at the image border.
+
+    Args:
+        mask: shape (H, W), not empty.
+        intrinsics: of the image.
+        T_base_cam: camera pose in base, shape (4, 4).
+        depth: about how far the body is, m.
+    """
     contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     hull = cv2.convexHull(np.concatenate(contours)).reshape(-1, 2).astype(np.float64)
-    reach = (intrinsics.normalise(hull) @ _DIRECTIONS.T).max(axis=0) + 0.5 / intrinsics.fx
-    normals = np.column_stack([_DIRECTIONS, -reach]) @ T_base_cam[:3, :3].T
+    along = intrinsics.normalise(hull) @ _DIRECTIONS.T
+    touching = hull[along.argmax(axis=0)]
+    inside = np.all((touching > 0) & (touching < [intrinsics.width - 1, intrinsics.height - 1]), axis=1)
+    reach = along.max(axis=0)[inside] + 0.5 / intrinsics.fx
+    normals = np.column_stack([_DIRECTIONS[inside], -reach]) @ T_base_cam[:3, :3].T
     return Outline(T_base_cam[:3, 3].copy(), normals, depth, 1.0 / intrinsics.fx)
 
 
@@ -95,7 +128,7 @@ def misfit(body: UprightBody, outline: Outline, support_height: float) -> FloatA
 
 def fit_upright_body(
     outlines: Sequence[Outline],
-    point: FloatArray,
+    prior: BodyPrior,
     support_height: float,
     settings: BodySettings,
     start: UprightBody | None = None,
@@ -104,28 +137,26 @@ def fit_upright_body(
 
     Args:
         outlines: at least one.
-        point: about where the body is, in base, shape (3,), m.
+        prior: what is expected.
         support_height: height of the table in base, m.
-        settings: noise and prior.
-        start: an earlier fit to begin from; None tries several yaws.
+        settings: noise.
+        start: an earlier fit to begin from; None tries several yaws about the expected one.
     """
-    expected = np.array([point[0], point[1], 0.0, *np.full(3, np.log(settings.half_size_m)), 0.0, 0.0])
-    if start is not None:
-        expected[2] = start.parameters[2]
-    spread = np.array([settings.position_std_m] * 2 + [1.0] + [settings.log_size_std] * 3 + [2.0, 2.0])
     planes = _Planes.of(outlines)
     noise = planes.pixel * settings.outline_std_px
 
     def residuals(parameters: FloatArray) -> FloatArray:
-        return np.concatenate([planes.misfit(parameters, support_height) / noise, (parameters - expected) / spread])
+        return np.concatenate(
+            [planes.misfit(parameters, support_height) / noise, (parameters - prior.mean) / prior.std]
+        )
 
     def solution(first: FloatArray, evaluations: int):
-        return least_squares(residuals, first, x_scale=spread, loss="soft_l1", f_scale=2.0, max_nfev=evaluations)
+        return least_squares(residuals, first, x_scale=prior.std, loss="soft_l1", f_scale=2.0, max_nfev=evaluations)
 
     if start is not None:
         found = solution(start.parameters, 12)
     else:
-        turned = [expected + np.eye(8)[2] * yaw for yaw in (0.0, np.pi / 6, np.pi / 3)]
+        turned = [prior.mean + np.eye(8)[2] * yaw for yaw in (0.0, np.pi / 6, np.pi / 3)]
         found = min((solution(first, 60) for first in turned), key=lambda result: result.cost)
     return _body(found.x, found.jac, support_height, settings)
 

@@ -73,6 +73,11 @@ def test_fingers_keep_off_the_table():
     assert low[2] == pytest.approx(-0.11)  # the point itself is left alone
 
 
+def test_grasp_is_below_the_middle_of_what_stands_on_the_table():
+    tall = begin_grasp(POSE, POINT, POINT[2] - 0.04, 0.0, GAINS).goal - begin_grasp(POSE, POINT, None, 0.0, GAINS).goal
+    np.testing.assert_allclose(tall, [0.0, 0.0, -(1.0 - GAINS.grasp_height) * 0.04], atol=1e-12)
+
+
 def test_recovery_goes_straight_back():
     twist = manoeuvre_twist(begin_recovery(POSE, 0.0, GAINS), POSE, GAINS)
     np.testing.assert_allclose(twist, [0.0, 0.0, -GAINS.tool_speed, 0.0, 0.0, 0.0], atol=1e-12)

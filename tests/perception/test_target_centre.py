@@ -49,22 +49,64 @@ def test_outlines_are_kept_from_new_places_only():
     assert len(known.outlines) == 1
 
 
-def test_outlines_cut_by_the_border_or_at_unknown_distance_are_not_kept():
-    pose = approach(CENTRE)[0]
-    seen, fixation = sight(CENTRE, pose)
-    cut, unsure = replace(seen, touches_border=True), replace(fixation, distance_std_m=0.2)
-    for a, b in ((cut, fixation), (seen, unsure)):
-        assert with_outline(TargetBody(), a, b, CAMERA, pose, TABLE, SETTINGS).outlines == ()
-
-
-def test_pushed_body_is_found_at_its_new_place():
+def test_a_pushed_body_is_found_at_its_new_place_at_once_and_keeps_its_size():
     poses = approach(CENTRE)
-    known = followed(TargetBody(), CENTRE, poses[:6])
+    known = followed(TargetBody(), CENTRE, poses[:8])
     moved = CENTRE + np.array([0.05, 0.02, 0.0])
-    known = followed(known, moved, poses[6:])
-    assert len(known.outlines) == len(poses) - 6
+    for pose in poses[8:]:
+        known = followed(known, moved, [pose])
+        body = known.believed(pose, SETTINGS)
+        assert body is not None
+        assert np.linalg.norm(body.centre - moved) < 0.003
+        np.testing.assert_allclose(body.half_sizes[2], HALF_SIZES[2], atol=0.003)
+
+
+@pytest.mark.parametrize("side", [slice(None, 160), slice(160, None)])
+def test_a_body_that_is_covered_from_one_side_stays_where_it_is(side):
+    poses = approach(CENTRE)
+    known = followed(TargetBody(), CENTRE, poses[:8])
+    for pose in poses[8:]:
+        seen, fixation = sight(CENTRE, pose)
+        mask = seen.mask.copy()
+        mask[:, side] = False
+        known = with_outline(known, replace(seen, mask=mask), fixation, CAMERA, pose, TABLE, SETTINGS)
     assert known.body is not None
-    assert np.linalg.norm(known.body.centre - moved) < 0.002
+    assert np.linalg.norm(known.body.centre - CENTRE) < 0.002
+
+
+def test_a_body_first_seen_in_part_is_found_when_all_of_it_appears():
+    poses = [pose for _ in range(2) for pose in approach(CENTRE)]
+    known = TargetBody()
+    for index, pose in enumerate(poses):
+        seen, fixation = sight(CENTRE, pose)
+        mask = seen.mask.copy()
+        if index < 8:
+            mask[:, :150] = False
+        known = with_outline(known, replace(seen, mask=mask), fixation, CAMERA, pose, TABLE, SETTINGS)
+    assert known.body is not None
+    assert np.linalg.norm(known.body.centre - CENTRE) < 0.002
+
+
+def test_a_body_that_stays_out_of_sight_for_the_most_part_is_forgotten():
+    poses = approach(CENTRE)
+    known = followed(TargetBody(), CENTRE, poses)
+    seen, fixation = sight(CENTRE, poses[-1])
+    rows, columns = np.nonzero(seen.mask)
+    small = np.zeros_like(seen.mask)
+    small[rows[0] : rows[0] + 4, columns[0] : columns[0] + 4] = True
+    bit = replace(seen, mask=small & seen.mask)
+    for count in range(SETTINGS.doubts):
+        assert known.body is not None, count
+        known = with_outline(known, bit, fixation, CAMERA, poses[-1], TABLE, SETTINGS)
+    assert known.body is None
+    assert known.outlines == ()
+
+
+def test_without_sight_nothing_changes():
+    poses = approach(CENTRE)
+    known = followed(TargetBody(), CENTRE, poses)
+    seen, fixation = sight(CENTRE, poses[-1])
+    assert with_outline(known, replace(seen, visible=False), fixation, CAMERA, poses[-1], TABLE, SETTINGS) is known
 
 
 def test_number_of_outlines_is_bounded_and_the_newest_is_kept():

@@ -8,7 +8,16 @@ import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.perception.upright_body import BodySettings, UprightBody, fit_upright_body, misfit, outline_of
+from fixation_gym.perception.upright_body import (
+    TANGENTS,
+    BodySettings,
+    UprightBody,
+    fit_upright_body,
+    misfit,
+    moved_body,
+    outline_of,
+    unknown_body,
+)
 
 CAMERA = Intrinsics.from_fovy(240, 320, np.radians(42.5))
 TABLE = 0.1
@@ -57,7 +66,8 @@ def fitted(points, centre, poses, guess_error=(0.01, -0.01, 0.01)) -> tuple[Upri
     outlines = [
         outline_of(mask_of(points, pose), CAMERA, pose, float(pose[:3, 2] @ (centre - pose[:3, 3]))) for pose in poses
     ]
-    return fit_upright_body(outlines, centre + guess_error, TABLE, BodySettings()), outlines
+    prior = unknown_body(centre + guess_error, BodySettings())
+    return fit_upright_body(outlines, prior, TABLE, BodySettings()), outlines
 
 
 BODIES = [
@@ -90,7 +100,7 @@ def test_cut_outlines_do_not_draw_the_centre_away():
         if index in (3, 4):  # something covers the left half
             mask[:, : int(np.flatnonzero(mask.any(axis=0)).mean())] = False
         outlines.append(outline_of(mask, CAMERA, pose, float(pose[:3, 2] @ (centre - pose[:3, 3]))))
-    body = fit_upright_body(outlines, centre, TABLE, BodySettings())
+    body = fit_upright_body(outlines, unknown_body(centre, BodySettings()), TABLE, BodySettings())
     assert np.linalg.norm(body.centre - centre) < 0.002
     assert np.abs(misfit(body, outlines[3], TABLE)).max() > 5.0
     assert np.abs(misfit(body, outlines[-1], TABLE)).max() < 1.5
@@ -104,3 +114,25 @@ def test_depth_of_the_centre_with_its_standard_deviation():
     axis = pose[:3, 2]
     assert depth == pytest.approx(np.linalg.norm(centre - pose[:3, 3]))
     assert std == pytest.approx(np.sqrt(1e-6 * (axis[0] ** 2 + axis[1] ** 2) + 4e-6 * axis[2] ** 2))
+
+
+def test_one_look_finds_a_known_body_that_was_moved():
+    settings, half_sizes, shift = BodySettings(), (0.025, 0.02, 0.035), np.array([0.05, -0.03, 0.0])
+    centre = np.array([0.5, -0.1, TABLE + half_sizes[2]])
+    body, _ = fitted(surface("box", half_sizes, 0.3, centre), centre, approach(centre))
+    pose = approach(centre)[-4]
+    mask = mask_of(surface("box", half_sizes, 0.5, centre + shift), pose)
+    seen = outline_of(mask, CAMERA, pose, float(pose[:3, 2] @ (centre - pose[:3, 3])))
+    prior = moved_body(body.parameters, centre + 0.8 * shift, settings)
+    found = fit_upright_body([seen], prior, TABLE, settings)
+    assert np.linalg.norm(found.centre - centre - shift) < 0.002
+
+
+def test_tangents_at_the_image_border_are_left_out():
+    pose = approach(np.array([0.5, -0.1, 0.13]))[0]
+    mask = np.zeros((240, 320), np.bool_)
+    mask[100:140, :50] = True
+    outline = outline_of(mask, CAMERA, pose, 0.4)
+    assert 0 < len(outline.normals) < TANGENTS
+    to_the_left = (outline.normals @ pose[:3, :3])[:, 0] < -1e-9
+    assert not to_the_left.any()

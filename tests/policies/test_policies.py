@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import fixation_gym  # noqa: F401
+from fixation_gym.evaluation.rollout import run_episode
 from policies.baselines import RandomPolicy
 from policies.catalogue import POLICY_NAMES, make_policy
 
@@ -23,12 +24,13 @@ def play(env, policy, seed):
 
 @pytest.mark.sim
 @pytest.mark.parametrize("scenario", ["clear", "opaque", "translucent", "mirror"])
-def test_the_servo_picks_without_collision(scenario):
+def test_the_servo_picks_without_collision_and_knows_the_distance_of_the_centre(scenario):
     env = gym.make("FixationPick-v0", scenario=scenario)
-    info = play(env, make_policy("servo", env), seed=500_002)
+    result = run_episode(env, make_policy("servo", env), seed=500_002)
     env.close()
-    assert info["is_success"]
-    assert not info["collision"]
+    assert result.collision_free_success
+    assert result.distance_error_at_grasp_m is not None
+    assert result.distance_error_at_grasp_m < 0.005
 
 
 @pytest.mark.sim

@@ -47,7 +47,7 @@ def test_without_poses_the_fixation_constraint_leads_the_hand_to_the_target() ->
     assert np.linalg.norm(tool - TARGET) < 0.02
 
 
-@pytest.mark.parametrize("name", ["servo:dot_product", "servo:hard_filter"])
+@pytest.mark.parametrize("name", ["servo:dot_product", "servo:hard_filter", "servo:no_body"])
 def test_an_ablation_of_perception_leaves_the_behaviour_and_the_rest_of_perception_alone(name: str) -> None:
     variant, full = servo_variant(name), VARIANTS[0]
     assert variant.gains == full.gains
