@@ -1,4 +1,4 @@
-"""The open-loop manoeuvres: tool to the fixated point, close, lift; and backing off after a failure.
+"""The open-loop manoeuvres: tool to the target, close, lift; and backing off after a failure.
 
 A manoeuvre is a value. ``advance`` gives the next one for what the robot reads, ``manoeuvre_twist`` and
 ``gripper_command`` what to do in it. The servo policy and ``FixationPickZFC-v0`` share it.
@@ -7,7 +7,7 @@ A manoeuvre is a value. ``advance`` gives the next one for what the robot reads,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -49,6 +49,8 @@ class OpenLoopGains:
     """Height of the grasp above the support surface as a share of the point's: many things are widest below it."""
     finger_room: float = 0.011
     """Least height of the tool above the support surface, m."""
+    reaim_distance: float = 0.008
+    """A grasp is aimed anew when the target is farther than this from where it was, m."""
     grasp_timeout: float = 4.0
     """A motion that takes longer has failed, s."""
     close_seconds: float = 0.8
@@ -90,6 +92,20 @@ def begin_grasp(
     if support_height is not None:
         point[2] = support_height + max(gains.grasp_height * (point[2] - support_height), gains.finger_room)
     return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA)
+
+
+def reaimed(
+    manoeuvre: Manoeuvre, T_base_cam: FloatArray, point: FloatArray, support_height: float | None, gains: OpenLoopGains
+) -> Manoeuvre:
+    """The grasp with its goal where the target is now, if it was pushed; other manoeuvres as they are.
+
+    Arguments as in ``begin_grasp``.
+    """
+    if manoeuvre.stage is not Stage.GRASP:
+        return manoeuvre
+    goal = begin_grasp(T_base_cam, point, support_height, manoeuvre.started, gains).goal
+    pushed = float(np.linalg.norm(goal - manoeuvre.goal)) > gains.reaim_distance
+    return replace(manoeuvre, goal=goal) if pushed else manoeuvre
 
 
 def begin_recovery(T_base_cam: FloatArray, time: float, gains: OpenLoopGains) -> Manoeuvre:

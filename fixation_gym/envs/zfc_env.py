@@ -72,8 +72,8 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
     table. While the object is out of sight the gaze stays where it is believed to be; before it was first seen the
     camera searches for it and the trigger does nothing.
 
-    The grasp is the paper's open-loop manoeuvre: tool to the fixated point, close, lift. Actions are ignored until it
-    ends, and every ``step`` is still one control period. It fails if the tool takes more than 4 s to get there, if the
+    The grasp is the paper's open-loop manoeuvre: tool to the target's centre, close, lift; only a push of the target
+    changes its course. Actions are ignored until it ends, and every ``step`` is still one control period. It fails if the tool takes more than 4 s to get there, if the
     fingers close on nothing, or 3 s after it began to lift without success; then the hand opens, backs off by 12 cm and
     the agent is in control again.
 
@@ -154,7 +154,10 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         observation, reward, terminated, truncated, info = self.env.step(np.array([*twist / TWIST_LIMITS, gripper]))
         self._moment = now = self._take_in(observation, info)
         if self._manoeuvre is not None:
-            width, time = now.reading.gripper_width, now.reading.time
+            body, width, time = now.percept.body, now.reading.gripper_width, now.reading.time
+            if body is not None:
+                manoeuvre = self._manoeuvre
+                self._manoeuvre = open_loop.reaimed(manoeuvre, now.T_base_cam, body.centre, TABLE_HEIGHT, _OPEN_LOOP)
             self._manoeuvre = open_loop.advance(self._manoeuvre, now.T_base_cam, width, time, _OPEN_LOOP)
         return self._observation(), float(reward), terminated, truncated, info
 

@@ -44,6 +44,8 @@ class CentreSettings:
     """A known body that was moved fits its first outline as well as this, in the median."""
     doubts: int = 25
     """The body is forgotten after so many frames in a row in which half of the outline is missing."""
+    largest_half_size_m: float = 0.065
+    """What is longer is two things that touch in the image."""
     believed_std_m: float = 0.006
     """Standard deviation of the centre along the optical axis up to which it is believed."""
 
@@ -110,6 +112,8 @@ def with_outline(
     if known.body is not None:
         prior.mean[2] = known.body.parameters[2]  # no yaw is more likely than another
     body = fit_upright_body(outlines, prior, support_height, settings.body, known.body)
+    if body.half_sizes.max() > settings.largest_half_size_m:
+        return TargetBody((newest,))
     return TargetBody(outlines, body, known.prior)
 
 

@@ -40,7 +40,7 @@ class BodySettings:
     """The same of a body whose size is known and that was moved."""
     position_std_m: float = 0.03
     """How far the centre may be from where it is expected, m."""
-    model_std_m: float = 5e-4
+    model_std_m: float = 1e-3
     """Error of the centre because no body is exactly of this kind, m."""
 
 

@@ -58,6 +58,8 @@ class ServoGains:
     search_climb: float = 0.08
     """Speed at which the search rises around the place where the target should be, to look from above, m/s."""
     search_distance: float = 0.40
-    """The search backs off to this distance of that place, m."""
+    """The search backs off to this distance of that place, or of the table while there is none, m."""
+    search_retreat_speed: float = 0.08
+    """Speed of backing off, m/s."""
     search_seconds: float = 5.0
     """After this time the search looks elsewhere, too, s."""

@@ -133,6 +133,9 @@ class ServoPolicy:
         unseen = time - self._last_seen
         if self._manoeuvre is not None:
             width = observation.gripper_width
+            if percept.body is not None:
+                point, support = percept.body.centre, self._perception.support_height_m
+                self._manoeuvre = open_loop.reaimed(self._manoeuvre, T_base_cam, point, support, self.gains.open_loop)
             self._manoeuvre = open_loop.advance(self._manoeuvre, T_base_cam, width, time, self.gains.open_loop)
             if self._manoeuvre is None:
                 self._phase, self._phase_start = Phase.FIXATE, time
@@ -178,7 +181,10 @@ class ServoPolicy:
         if seconds > gains.search_seconds:
             return gaze.searching_twist(seconds - gains.search_seconds, gains.gaze)
         lateral = gaze.within_reach(np.array([0.0, -gains.search_climb]), T_base_cam, fixation.point_base, gains.gaze)
-        back = -gains.retreat_speed if fixation.distance_m < gains.search_distance else 0.0
+        support, distance = self._perception.support_height_m, fixation.distance_m
+        if not fixation.initialised and support is not None:  # the target is somewhere on the table
+            distance = (T_base_cam[2, 3] - support) / max(math.sin(gaze.elevation(T_base_cam)), 0.1)
+        back = -gains.search_retreat_speed if distance < gains.search_distance else 0.0
         expected = np.clip(fixation.centroid, -_FAR_OFF, _FAR_OFF) if fixation.initialised else np.zeros(2)
         level = gaze.levelling(T_base_cam, gains.gaze)
         return gaze.fixating_twist(np.array([*lateral, back]), expected, fixation.distance_m, level, gains.gaze)

@@ -14,6 +14,7 @@ from fixation_gym.control.open_loop import (
     begin_recovery,
     gripper_command,
     manoeuvre_twist,
+    reaimed,
 )
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.geometry.twist import exp_twist
@@ -76,6 +77,16 @@ def test_fingers_keep_off_the_table():
 def test_grasp_is_below_the_middle_of_what_stands_on_the_table():
     tall = begin_grasp(POSE, POINT, POINT[2] - 0.04, 0.0, GAINS).goal - begin_grasp(POSE, POINT, None, 0.0, GAINS).goal
     np.testing.assert_allclose(tall, [0.0, 0.0, -(1.0 - GAINS.grasp_height) * 0.04], atol=1e-12)
+
+
+def test_a_grasp_follows_a_pushed_target_and_nothing_less():
+    grasp = begin_grasp(POSE, POINT, None, 0.0, GAINS)
+    for shift, follows in ((0.5 * GAINS.reaim_distance, False), (2.0 * GAINS.reaim_distance, True)):
+        moved = reaimed(grasp, POSE, POINT + [shift, 0.0, 0.0], None, GAINS)
+        np.testing.assert_allclose(moved.goal - grasp.goal, [shift if follows else 0.0, 0.0, 0.0], atol=1e-12)
+        assert (moved.stage, moved.started) == (grasp.stage, grasp.started)
+    lift = Manoeuvre(Stage.LIFT, 1.0, np.zeros(3))
+    assert reaimed(lift, POSE, POINT, None, GAINS) is lift
 
 
 def test_recovery_goes_straight_back():

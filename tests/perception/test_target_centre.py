@@ -102,6 +102,20 @@ def test_a_body_that_stays_out_of_sight_for_the_most_part_is_forgotten():
     assert known.outlines == ()
 
 
+def test_two_things_that_touch_in_the_image_are_no_body_until_they_part():
+    poses = [pose for _ in range(2) for pose in approach(CENTRE)]
+    known = TargetBody()
+    for index, pose in enumerate(poses):
+        seen, fixation = sight(CENTRE, pose)
+        if index < 10:
+            other, _ = sight(CENTRE + np.array([-0.09, 0.09, 0.0]), pose)
+            seen = replace(seen, mask=seen.mask | other.mask)
+            assert known.body is None
+        known = with_outline(known, seen, fixation, CAMERA, pose, TABLE, SETTINGS)
+    assert known.body is not None
+    assert np.linalg.norm(known.body.centre - CENTRE) < 0.002
+
+
 def test_without_sight_nothing_changes():
     poses = approach(CENTRE)
     known = followed(TargetBody(), CENTRE, poses)
