@@ -82,7 +82,7 @@ def test_grasp_is_below_the_middle_of_what_stands_on_the_table():
 def test_a_grasp_follows_a_pushed_target_and_nothing_less():
     grasp = begin_grasp(POSE, POINT, None, 0.0, GAINS)
     for shift, follows in ((0.5 * GAINS.reaim_distance, False), (2.0 * GAINS.reaim_distance, True)):
-        moved = reaimed(grasp, POSE, POINT + [shift, 0.0, 0.0], None, GAINS)
+        moved = reaimed(grasp, POSE, POINT + np.array([shift, 0.0, 0.0]), None, GAINS)
         np.testing.assert_allclose(moved.goal - grasp.goal, [shift if follows else 0.0, 0.0, 0.0], atol=1e-12)
         assert (moved.stage, moved.started) == (grasp.stage, grasp.started)
     lift = Manoeuvre(Stage.LIFT, 1.0, np.zeros(3))
