@@ -49,6 +49,8 @@ class OpenLoopGains:
     """Height of the grasp above the support surface as a share of the point's: many things are widest below it."""
     finger_room: float = 0.011
     """Least height of the tool above the support surface, m."""
+    finger_length: float = 0.043
+    """Distance from the tool back to the palm, which must not touch the target, m."""
     reaim_distance: float = 0.008
     """A grasp is aimed anew when the target is farther than this from where it was, m."""
     grasp_timeout: float = 4.0
@@ -76,34 +78,43 @@ class Manoeuvre:
     """Camera position in base at which the stage's motion ends, shape (3,), m."""
 
 
-def begin_grasp(
-    T_base_cam: FloatArray, point: FloatArray, support_height: float | None, time: float, gains: OpenLoopGains
-) -> Manoeuvre:
-    """Start the grasp of the target.
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """What is grasped."""
+
+    point: FloatArray
+    """Its centre, or, if ``reach`` is unknown, the middle of its visible surface, in base, shape (3,), m."""
+    reach: float | None
+    """How far it reaches from its centre towards the camera, along the optical axis, m; None if unknown."""
+    support_height: float | None
+    """Height of the table in base, m; None if unknown."""
+
+
+def begin_grasp(T_base_cam: FloatArray, target: Target, time: float, gains: OpenLoopGains) -> Manoeuvre:
+    """Start the grasp: a little below the centre, but no deeper than the fingers are long.
 
     Args:
         T_base_cam: camera pose, shape (4, 4); the hand keeps its orientation.
-        point: centre of the target in base, shape (3,), m.
-        support_height: height of the table in base, m; None if unknown.
+        target: what to grasp.
         time: s.
         gains: numbers of the manoeuvre.
     """
-    point = point.copy()
-    if support_height is not None:
-        point[2] = support_height + max(gains.grasp_height * (point[2] - support_height), gains.finger_room)
+    point, support = target.point.copy(), target.support_height
+    if support is not None and target.reach is not None:
+        point[2] = support + gains.grasp_height * (point[2] - support)
+    if target.reach is not None:
+        axis = T_base_cam[:3, 2]
+        point -= axis * max(0.0, target.reach + float(axis @ (point - target.point)) - gains.finger_length)
+    if support is not None:
+        point[2] = max(point[2], support + gains.finger_room)
     return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA)
 
 
-def reaimed(
-    manoeuvre: Manoeuvre, T_base_cam: FloatArray, point: FloatArray, support_height: float | None, gains: OpenLoopGains
-) -> Manoeuvre:
-    """The grasp with its goal where the target is now, if it was pushed; other manoeuvres as they are.
-
-    Arguments as in ``begin_grasp``.
-    """
+def reaimed(manoeuvre: Manoeuvre, T_base_cam: FloatArray, target: Target, gains: OpenLoopGains) -> Manoeuvre:
+    """The grasp with its goal where the target is now, if it was pushed; other manoeuvres as they are."""
     if manoeuvre.stage is not Stage.GRASP:
         return manoeuvre
-    goal = begin_grasp(T_base_cam, point, support_height, manoeuvre.started, gains).goal
+    goal = begin_grasp(T_base_cam, target, manoeuvre.started, gains).goal
     pushed = float(np.linalg.norm(goal - manoeuvre.goal)) > gains.reaim_distance
     return replace(manoeuvre, goal=goal) if pushed else manoeuvre
 

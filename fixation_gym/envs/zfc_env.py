@@ -12,7 +12,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from fixation_gym.control import gaze, open_loop
 from fixation_gym.control.gaze import GazeGains
-from fixation_gym.control.open_loop import Manoeuvre, OpenLoopGains
+from fixation_gym.control.open_loop import Manoeuvre, OpenLoopGains, Target
 from fixation_gym.envs.arguments import checked_action, require_choice
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.scene import TABLE_HEIGHT
@@ -143,8 +143,7 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         action = checked_action(action, 4)
         now = self._moment
         if self._manoeuvre is None and action[3] > 0.0 and now.percept.fixation.initialised:
-            point, time = now.percept.centre_base, now.reading.time
-            self._manoeuvre = open_loop.begin_grasp(now.T_base_cam, point, TABLE_HEIGHT, time, _OPEN_LOOP)
+            self._manoeuvre = open_loop.begin_grasp(now.T_base_cam, _target(now), now.reading.time, _OPEN_LOOP)
         if self._manoeuvre is not None:
             twist = open_loop.manoeuvre_twist(self._manoeuvre, now.T_base_cam, _OPEN_LOOP)
         else:
@@ -154,10 +153,9 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         observation, reward, terminated, truncated, info = self.env.step(np.array([*twist / TWIST_LIMITS, gripper]))
         self._moment = now = self._take_in(observation, info)
         if self._manoeuvre is not None:
-            body, width, time = now.percept.body, now.reading.gripper_width, now.reading.time
-            if body is not None:
-                manoeuvre = self._manoeuvre
-                self._manoeuvre = open_loop.reaimed(manoeuvre, now.T_base_cam, body.centre, TABLE_HEIGHT, _OPEN_LOOP)
+            width, time = now.reading.gripper_width, now.reading.time
+            if now.percept.body is not None:
+                self._manoeuvre = open_loop.reaimed(self._manoeuvre, now.T_base_cam, _target(now), _OPEN_LOOP)
             self._manoeuvre = open_loop.advance(self._manoeuvre, now.T_base_cam, width, time, _OPEN_LOOP)
         return self._observation(), float(reward), terminated, truncated, info
 
@@ -178,6 +176,10 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         observation["fixation"] = fixation_vector(now.percept.fixation)
         observation["proprio"] = proprio_vector(now.reading, now.T_base_cam, stage)
         return observation
+
+
+def _target(now: _Moment) -> Target:
+    return Target(now.percept.centre_base, now.percept.reach_towards(now.T_base_cam), TABLE_HEIGHT)
 
 
 def _gazing_twist(v: FloatArray, now: _Moment) -> FloatArray:

@@ -97,6 +97,10 @@ class Percept:
         """Centre of the target in base, shape (3,), m: of its body if that is known, else the fixated point."""
         return self.fixation.point_base if self.body is None else self.body.centre
 
+    def reach_towards(self, T_base_cam: FloatArray) -> float | None:
+        """How far the target's body reaches from its centre towards a camera, m; None if the body is not known."""
+        return None if self.body is None else self.body.reach(-T_base_cam[:3, 2])
+
 
 class Perception:
     """Follows the target's distance and tests what is in front of it, one observation at a time."""

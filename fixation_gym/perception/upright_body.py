@@ -74,6 +74,10 @@ class UprightBody:
         """a, b, c, shape (3,), m."""
         return np.exp(self.parameters[3:6])
 
+    def reach(self, normal: FloatArray) -> float:
+        """Distance from the centre to the plane with this unit normal, shape (3,) in base, that touches the body, m."""
+        return float(_support(self.parameters, normal[None])[0])
+
     def depth(self, T_base_cam: FloatArray) -> tuple[float, float]:
         """Depth of the centre along a camera's optical axis and its standard deviation, m."""
         axis = T_base_cam[:3, 2]
@@ -193,16 +197,22 @@ class _Planes:
 
     def misfit(self, parameters: FloatArray, support_height: float) -> FloatArray:
         """By how much each tangent of the body lies outside the outline's, shape (n,), normalised coordinates."""
-        x, y, yaw = parameters[:3]
-        a, b, c = np.exp(np.clip(parameters[3:6], -7.0, 0.0))
-        p, q = 1.5 + 0.5 * np.sin(parameters[6:])  # both ends can be reached
-        nx, ny, nz = self.normals.T
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        along, across = a * np.abs(cos * nx + sin * ny), b * np.abs(cos * ny - sin * nx)
-        flat = (along**p + across**p) ** (q / p)
-        reach = (flat + (c * np.abs(nz)) ** q) ** (1.0 / q)
-        offset = np.array([x, y, support_height + c]) - self.origin
+        x, y = parameters[:2]
+        offset = np.array([x, y, support_height + np.exp(parameters[5])]) - self.origin
+        reach = _support(parameters, self.normals)
         return (np.einsum("ij,ij->i", self.normals, offset) + reach) / self.depth
+
+
+def _support(parameters: FloatArray, normals: FloatArray) -> FloatArray:
+    """Support function g of the body about its centre, for normals of shape (n, 3), m."""
+    yaw = parameters[2]
+    a, b, c = np.exp(np.clip(parameters[3:6], -7.0, 0.0))
+    p, q = 1.5 + 0.5 * np.sin(parameters[6:])  # both ends can be reached
+    nx, ny, nz = normals.T
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    along, across = a * np.abs(cos * nx + sin * ny), b * np.abs(cos * ny - sin * nx)
+    flat = (along**p + across**p) ** (q / p)
+    return (flat + (c * np.abs(nz)) ** q) ** (1.0 / q)
 
 
 _ANGLES = 2.0 * np.pi * np.arange(TANGENTS) / TANGENTS

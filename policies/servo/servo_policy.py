@@ -10,7 +10,7 @@ import numpy as np
 
 from fixation_gym.control import gaze, open_loop, servo_laws
 from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
-from fixation_gym.control.open_loop import Manoeuvre, Stage
+from fixation_gym.control.open_loop import Manoeuvre, Stage, Target
 from fixation_gym.control.way_out import way_out
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
 from fixation_gym.geometry.twist import exp_twist
@@ -134,8 +134,8 @@ class ServoPolicy:
         if self._manoeuvre is not None:
             width = observation.gripper_width
             if percept.body is not None:
-                point, support = percept.body.centre, self._perception.support_height_m
-                self._manoeuvre = open_loop.reaimed(self._manoeuvre, T_base_cam, point, support, self.gains.open_loop)
+                target = self._target(percept, T_base_cam)
+                self._manoeuvre = open_loop.reaimed(self._manoeuvre, T_base_cam, target, self.gains.open_loop)
             self._manoeuvre = open_loop.advance(self._manoeuvre, T_base_cam, width, time, self.gains.open_loop)
             if self._manoeuvre is None:
                 self._phase, self._phase_start = Phase.FIXATE, time
@@ -153,15 +153,15 @@ class ServoPolicy:
         )
         phase = next_phase(self._phase, situation, self.gains)
         if isinstance(phase, Stage):
-            self._manoeuvre = self._begin_grasp(percept, T_base_cam)
+            target = self._target(percept, T_base_cam)
+            self._manoeuvre = open_loop.begin_grasp(T_base_cam, target, time, self.gains.open_loop)
             self._grasps += 1
         elif phase is not self._phase:
             self._phase, self._phase_start = phase, time
 
-    def _begin_grasp(self, percept: Percept, T_base_cam: FloatArray) -> Manoeuvre:
-        gains = self.gains.open_loop
+    def _target(self, percept: Percept, T_base_cam: FloatArray) -> Target:
         support = self._perception.support_height_m
-        return open_loop.begin_grasp(T_base_cam, percept.centre_base, support, percept.time, gains)
+        return Target(percept.centre_base, percept.reach_towards(T_base_cam), support)
 
     # -- laws ----------------------------------------------------------------------------------------------------
 

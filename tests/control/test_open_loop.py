@@ -9,6 +9,7 @@ from fixation_gym.control.open_loop import (
     Manoeuvre,
     OpenLoopGains,
     Stage,
+    Target,
     advance,
     begin_grasp,
     begin_recovery,
@@ -22,6 +23,7 @@ from fixation_gym.robot import TOOL_IN_CAMERA
 
 GAINS = OpenLoopGains(hold_seconds=3.0)
 POINT = np.array([0.55, 0.0, -0.08])
+TARGET = Target(POINT, None, None)
 POSE = look_at(np.array([0.45, -0.05, 0.06]), POINT, np.array([0.0, 0.0, 1.0]))
 FAR, HERE = POSE[:3, 3] + [0.0, 0.0, 0.1], POSE[:3, 3]
 
@@ -55,7 +57,7 @@ def test_a_policy_that_nobody_stops_holds_on_to_what_it_lifted():
 
 
 def test_the_grasp_brings_the_tool_to_the_point_without_turning_and_never_backwards():
-    grasp, pose = begin_grasp(POSE, POINT, None, 0.0, GAINS), POSE
+    grasp, pose = begin_grasp(POSE, TARGET, 0.0, GAINS), POSE
     for step in range(100):
         if advance(grasp, pose, 0.08, 0.04 * step, GAINS).stage is Stage.CLOSE:
             break
@@ -67,26 +69,40 @@ def test_the_grasp_brings_the_tool_to_the_point_without_turning_and_never_backwa
     assert np.linalg.norm(pose[:3, :3] @ TOOL_IN_CAMERA + pose[:3, 3] - POINT) < GAINS.tool_tolerance
 
 
+def tool_of(grasp):
+    """Where the tool is at the end of a grasp, in base, shape (3,), m."""
+    return grasp.goal + POSE[:3, :3] @ TOOL_IN_CAMERA
+
+
 def test_fingers_keep_off_the_table():
     low = POINT - [0.0, 0.0, 0.03]
-    raised = begin_grasp(POSE, low, -0.112, 0.0, GAINS).goal - begin_grasp(POSE, low, None, 0.0, GAINS).goal
-    np.testing.assert_allclose(raised, [0.0, 0.0, -0.112 + GAINS.finger_room - low[2]], atol=1e-12)
+    tool = tool_of(begin_grasp(POSE, Target(low, None, -0.112), 0.0, GAINS))
+    np.testing.assert_allclose(tool, [*low[:2], -0.112 + GAINS.finger_room], atol=1e-12)
     assert low[2] == pytest.approx(-0.11)  # the point itself is left alone
 
 
-def test_grasp_is_below_the_middle_of_what_stands_on_the_table():
-    tall = begin_grasp(POSE, POINT, POINT[2] - 0.04, 0.0, GAINS).goal - begin_grasp(POSE, POINT, None, 0.0, GAINS).goal
-    np.testing.assert_allclose(tall, [0.0, 0.0, -(1.0 - GAINS.grasp_height) * 0.04], atol=1e-12)
+def test_a_body_is_grasped_below_its_middle_and_a_surface_where_it_is():
+    table = POINT[2] - 0.04
+    below = POINT - [0.0, 0.0, (1.0 - GAINS.grasp_height) * 0.04]
+    np.testing.assert_allclose(tool_of(begin_grasp(POSE, Target(POINT, 0.02, table), 0.0, GAINS)), below, atol=1e-12)
+    np.testing.assert_allclose(tool_of(begin_grasp(POSE, Target(POINT, None, table), 0.0, GAINS)), POINT, atol=1e-12)
+
+
+def test_the_palm_stays_off_a_body_that_is_deeper_than_the_fingers_are_long():
+    reach = GAINS.finger_length + 0.01
+    tool = tool_of(begin_grasp(POSE, Target(POINT, reach, POINT[2] - 0.04), 0.0, GAINS))
+    touching = POINT - reach * POSE[:3, 2]
+    assert POSE[:3, 2] @ (tool - touching) == pytest.approx(GAINS.finger_length)
 
 
 def test_a_grasp_follows_a_pushed_target_and_nothing_less():
-    grasp = begin_grasp(POSE, POINT, None, 0.0, GAINS)
+    grasp = begin_grasp(POSE, TARGET, 0.0, GAINS)
     for shift, follows in ((0.5 * GAINS.reaim_distance, False), (2.0 * GAINS.reaim_distance, True)):
-        moved = reaimed(grasp, POSE, POINT + np.array([shift, 0.0, 0.0]), None, GAINS)
+        moved = reaimed(grasp, POSE, replace(TARGET, point=POINT + np.array([shift, 0.0, 0.0])), GAINS)
         np.testing.assert_allclose(moved.goal - grasp.goal, [shift if follows else 0.0, 0.0, 0.0], atol=1e-12)
         assert (moved.stage, moved.started) == (grasp.stage, grasp.started)
     lift = Manoeuvre(Stage.LIFT, 1.0, np.zeros(3))
-    assert reaimed(lift, POSE, POINT, None, GAINS) is lift
+    assert reaimed(lift, POSE, TARGET, GAINS) is lift
 
 
 def test_recovery_goes_straight_back():
