@@ -109,8 +109,8 @@ def with_outline(
     if known.body is None and len(outlines) < settings.least_outlines:
         return TargetBody(outlines)
     prior = known.prior or unknown_body(fixation.point_base, settings.body)
-    if known.body is not None:
-        prior.mean[2] = known.body.parameters[2]  # no yaw is more likely than another
+    if known.body is not None:  # no yaw is more likely than another
+        prior = replace(prior, mean=np.array([*prior.mean[:2], known.body.parameters[2], *prior.mean[3:]]))
     body = fit_upright_body(outlines, prior, support_height, settings.body, known.body)
     if body.half_sizes.max() > settings.largest_half_size_m:
         return TargetBody((newest,))
