@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.distance_filters import Fixation
+from fixation_gym.perception.distance_filters import MIN_DEPTH_M, Fixation
 from fixation_gym.perception.segmentation import Segmentation
 from fixation_gym.perception.upright_body import (
     TANGENTS,
@@ -93,7 +93,8 @@ def with_outline(
     """
     if not seen.visible:
         return known
-    newest = outline_of(seen.mask, intrinsics, T_base_cam, fixation.distance_m)
+    depth = fixation.distance_m if known.body is None else max(known.body.depth(T_base_cam)[0], MIN_DEPTH_M)
+    newest = outline_of(seen.mask, intrinsics, T_base_cam, depth)
     if known.body is not None:
         excess = misfit(known.body, newest, support_height)
         if np.count_nonzero(excess < -settings.contradiction_px) > settings.moved_share * TANGENTS:
@@ -103,7 +104,7 @@ def with_outline(
     if len(newest.normals) < TANGENTS / 2:
         doubts = known.doubts + 1
         return replace(known, doubts=doubts) if doubts < settings.doubts else TargetBody()
-    if not _is_new_view(known.outlines, T_base_cam, settings.baseline * fixation.distance_m):
+    if not _is_new_view(known.outlines, T_base_cam, settings.baseline * depth):
         return replace(known, doubts=0)
     outlines = (*_thinned(known.outlines, settings.max_outlines), newest)
     if known.body is None and len(outlines) < settings.least_outlines:
