@@ -150,12 +150,24 @@ def fit_upright_body(
     noise = planes.pixel * settings.outline_std_px
 
     def residuals(parameters: FloatArray) -> FloatArray:
-        return np.concatenate(
-            [planes.misfit(parameters, support_height) / noise, (parameters - prior.mean) / prior.std]
-        )
+        seen = planes.misfit(parameters, support_height) / noise
+        return np.concatenate([seen, (parameters - prior.mean) / prior.std])
+
+    def jacobian(parameters: FloatArray) -> FloatArray:
+        return np.concatenate([planes.jacobian(parameters) / noise[:, None], np.diag(1.0 / prior.std)])
 
     def solution(first: FloatArray, evaluations: int):
-        return least_squares(residuals, first, x_scale=prior.std, loss="soft_l1", f_scale=2.0, max_nfev=evaluations)
+        return least_squares(
+            residuals,
+            first,
+            jacobian,  # pyright: ignore[reportArgumentType]  # SciPy takes functions, too
+            x_scale=prior.std,
+            loss="soft_l1",
+            f_scale=2.0,
+            ftol=1e-4,
+            xtol=1e-4,
+            max_nfev=evaluations,
+        )
 
     if start is not None:
         found = solution(start.parameters, 12)
@@ -202,18 +214,52 @@ class _Planes:
         reach = _support(parameters, self.normals)
         return (np.einsum("ij,ij->i", self.normals, offset) + reach) / self.depth
 
+    def jacobian(self, parameters: FloatArray) -> FloatArray:
+        """Derivative of ``misfit``, shape (n, 8)."""
+        result = _support_jacobian(parameters, self.normals)
+        result[:, :2] = self.normals[:, :2]
+        result[:, 5] += self.normals[:, 2] * np.exp(parameters[5])  # half as high again as it stands
+        return result / self.depth[:, None]
+
+
+def _parts(parameters: FloatArray, normals: FloatArray) -> tuple[FloatArray, ...]:
+    """A, B, C, the two parts of the normals along the body's axes, and the exponents p and q."""
+    a, b, c = np.exp(parameters[3:6])
+    p, q = 1.5 + 0.5 * np.sin(parameters[6:])  # both ends can be reached
+    cos, sin = np.cos(parameters[2]), np.sin(parameters[2])
+    along = cos * normals[:, 0] + sin * normals[:, 1]
+    across = cos * normals[:, 1] - sin * normals[:, 0]
+    lengths = (np.abs(part) + _TINY for part in (along, across, normals[:, 2]))
+    A, B, C = (size * length for size, length in zip((a, b, c), lengths, strict=True))
+    return A, B, C, along, across, p, q
+
 
 def _support(parameters: FloatArray, normals: FloatArray) -> FloatArray:
     """Support function g of the body about its centre, for normals of shape (n, 3), m."""
-    yaw = parameters[2]
-    a, b, c = np.exp(np.clip(parameters[3:6], -7.0, 0.0))
-    p, q = 1.5 + 0.5 * np.sin(parameters[6:])  # both ends can be reached
-    nx, ny, nz = normals.T
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    along, across = a * np.abs(cos * nx + sin * ny), b * np.abs(cos * ny - sin * nx)
-    flat = (along**p + across**p) ** (q / p)
-    return (flat + (c * np.abs(nz)) ** q) ** (1.0 / q)
+    A, B, C, _, _, p, q = _parts(parameters, normals)
+    return ((A**p + B**p) ** (q / p) + C**q) ** (1.0 / q)
 
 
+def _support_jacobian(parameters: FloatArray, normals: FloatArray) -> FloatArray:
+    """Derivative of g by the parameters, shape (n, 8); it does not depend on x and y."""
+    A, B, C, along, across, p, q = _parts(parameters, normals)
+    flat = (A**p + B**p) ** (1.0 / p)
+    g = (flat**q + C**q) ** (1.0 / q)
+    by_flat, by_C = (flat / g) ** (q - 1.0), (C / g) ** (q - 1.0)
+    by_A, by_B = by_flat * (A / flat) ** (p - 1.0), by_flat * (B / flat) ** (p - 1.0)
+    share, upright = (A / flat) ** p, (flat / g) ** q
+    by_p = by_flat * flat / p * (share * np.log(A / flat) + (1.0 - share) * np.log(B / flat))
+    by_q = g / q * (upright * np.log(flat / g) + (1.0 - upright) * np.log(C / g))
+    turning = by_A * A * across / (along + np.copysign(_TINY, along)) - by_B * B * along / (
+        across + np.copysign(_TINY, across)
+    )
+    slope_p, slope_q = 0.5 * np.cos(parameters[6:])
+    zero = np.zeros(len(g))
+    columns = [zero, zero, turning, by_A * A, by_B * B, by_C * C, by_p * slope_p, by_q * slope_q]
+    return np.stack(columns, axis=1)
+
+
+_TINY = 1e-9
+"""Keeps logarithms of lengths finite, m."""
 _ANGLES = 2.0 * np.pi * np.arange(TANGENTS) / TANGENTS
 _DIRECTIONS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])

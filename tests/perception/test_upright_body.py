@@ -12,6 +12,7 @@ from fixation_gym.perception.upright_body import (
     TANGENTS,
     BodySettings,
     UprightBody,
+    _Planes,
     fit_upright_body,
     misfit,
     moved_body,
@@ -136,3 +137,16 @@ def test_tangents_at_the_image_border_are_left_out():
     assert 0 < len(outline.normals) < TANGENTS
     to_the_left = (outline.normals @ pose[:3, :3])[:, 0] < -1e-9
     assert not to_the_left.any()
+
+
+def test_jacobian_is_the_derivative_of_the_misfit():
+    rng = np.random.default_rng(0)
+    count = 40
+    origin, depth, pixel = rng.normal(size=(count, 3)), rng.uniform(0.2, 0.5, count), np.full(count, 1 / 308)
+    planes = _Planes(origin, rng.normal(size=(count, 3)), depth, pixel)
+    for _ in range(10):
+        sizes = np.log(rng.uniform(0.01, 0.05, 3))
+        parameters = np.array([*rng.normal(size=2), rng.uniform(-2.0, 2.0), *sizes, *rng.uniform(-2.0, 2.0, 2)])
+        steps = 1e-6 * np.eye(8)
+        numeric = [planes.misfit(parameters + step, TABLE) - planes.misfit(parameters - step, TABLE) for step in steps]
+        np.testing.assert_allclose(planes.jacobian(parameters), np.array(numeric).T / 2e-6, atol=1e-6)
