@@ -111,7 +111,7 @@ def begin_grasp(T_base_cam: FloatArray, target: Target, time: float, gains: Open
 
 
 def reaimed(manoeuvre: Manoeuvre, T_base_cam: FloatArray, target: Target, gains: OpenLoopGains) -> Manoeuvre:
-    """The grasp with its goal where the target is now, if it was pushed; other manoeuvres as they are."""
+    """The grasp with a new goal if the target was pushed, or is known only now; other manoeuvres as they are."""
     if manoeuvre.stage is not Stage.GRASP:
         return manoeuvre
     goal = begin_grasp(T_base_cam, target, manoeuvre.started, gains).goal

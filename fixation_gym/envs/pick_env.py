@@ -120,7 +120,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._percept: Percept | None = None
         self.scene: SceneSpec | None = None
         self.camera_on = True
-        """While False, steps render nothing, and the last image and percept stay: for training, where nobody looks."""
+        """While False, steps render nothing, and the last image and percept stay: for training, in grasps."""
 
     # -- Gymnasium interface -------------------------------------------------------------------------------------
 

@@ -72,10 +72,10 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
     table. While the object is out of sight the gaze stays where it is believed to be; before it was first seen the
     camera searches for it and the trigger does nothing.
 
-    The grasp is the paper's open-loop manoeuvre: tool to the target's centre, close, lift; only a push of the target
-    changes its course. Actions are ignored until it ends, and every ``step`` is still one control period. It fails if
-    the tool takes more than 4 s to get there, if the fingers close on nothing, or 3 s after it began to lift without
-    success; then the hand opens, backs off by 12 cm and the agent is in control again.
+    The grasp is the paper's open-loop manoeuvre: tool to the target's centre, close, lift; its course changes only if
+    the target is pushed, or its body seen better. Actions are ignored until it ends, and every ``step`` is still one
+    control period. It fails if the tool takes more than 4 s to get there, if the fingers close on nothing, or 3 s after
+    it began to lift without success; then the hand opens, backs off by 12 cm and the agent is in control again.
 
     **Observation** ``Dict``; the first row depends on ``observation``.
 

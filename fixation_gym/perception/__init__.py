@@ -1,4 +1,4 @@
-"""From images and camera poses to the fixated distance and the zero-flow map: NumPy and OpenCV, no simulator."""
+"""From images and camera poses to the fixated distance and the zero-flow map: NumPy, SciPy, OpenCV."""
 
 from fixation_gym.perception.distance_filters import DistanceSettings, Fixation
 from fixation_gym.perception.drawing import draw_overlay

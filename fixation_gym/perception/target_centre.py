@@ -136,7 +136,7 @@ def _moved(
         support_height: height of the table in base, m.
         settings: how well it must fit.
     """
-    if ray[2] > -1e-3:
+    if ray[2] > -1e-3 or newest.origin[2] < body.centre[2]:  # the ray does not come down to the table
         return TargetBody((newest,))
     point = newest.origin + ray * (body.centre[2] - newest.origin[2]) / ray[2]
     parameters = body.parameters if known.prior is None else known.prior.mean

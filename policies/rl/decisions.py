@@ -22,9 +22,9 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
 
     ``step`` holds an action for ``PERIODS`` control periods. If it triggers the grasp, it goes on until the manoeuvre
     has ended and the next action counts: steps whose actions are ignored would teach nothing, and with random
-    actions they are nearly all. While the tool goes in, the fingers close and lift, no image is rendered: that is open
-    loop anyway, and it is most of the time of a manoeuvre. Rewards and ``info["reward_terms"]`` are summed;
-    ``info["periods"]`` counts.
+    actions they are nearly all. While the tool goes in, the fingers close and lift, no image is rendered: it would be
+    most of the time of a manoeuvre. So in training, and only there, a grasp does not follow a target that is pushed.
+    Rewards and ``info["reward_terms"]`` are summed; ``info["periods"]`` counts.
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:

@@ -84,7 +84,7 @@ def busy(obs: Mapping[str, Any]) -> bool:
 
 
 def blind_stage(obs: Mapping[str, Any]) -> bool:
-    """Whether the hand acts without looking: all of a manoeuvre but the recovery, after which it looks again."""
+    """Whether no decision needs what is seen: all of a manoeuvre but the recovery, after which the hand looks again."""
     return bool(obs["proprio"][STAGE][:3].any())
 
 

@@ -74,9 +74,9 @@ class ServoPolicy:
         """Action of ``FixationPick-v0``, shape (7,), for its observation."""
         observation = Observation.from_dict(obs)
         self.percept = self._perception.update(observation)
-        moved_blindly = self._manoeuvre is not None
+        manoeuvring = self._manoeuvre is not None
         command = self.command(self.percept, observation)
-        if moved_blindly and self._manoeuvre is None:
+        if manoeuvring and self._manoeuvre is None:
             self._perception.reset()  # the target was pushed or dropped, so nothing known about it holds
         action = np.concatenate([command.camera_twist / TWIST_LIMITS, [command.gripper]])
         return action.astype(np.float32)

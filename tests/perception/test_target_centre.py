@@ -70,8 +70,9 @@ def test_a_body_that_is_covered_from_one_side_stays_where_it_is(side):
         mask = seen.mask.copy()
         mask[:, side] = False
         known = with_outline(known, replace(seen, mask=mask), fixation, CAMERA, pose, TABLE, SETTINGS)
-    assert known.body is not None
-    assert np.linalg.norm(known.body.centre - CENTRE) < 0.002
+        body = known.believed(pose, SETTINGS)
+        assert body is not None
+        assert np.linalg.norm(body.centre - CENTRE) < 0.002
 
 
 def test_a_body_first_seen_in_part_is_found_when_all_of_it_appears():

@@ -50,10 +50,10 @@ def mask_of(points, T_base_cam):
     return np.asarray(cv2.resize(fine, (320, 240), interpolation=cv2.INTER_AREA)) > 127
 
 
-def approach(target):
+def approach(target, count=14):
     """Camera poses of an approach that climbs from 45 to 72 degrees, as the servo's."""
     poses = []
-    for share in np.linspace(0.0, 1.0, 14):
+    for share in np.linspace(0.0, 1.0, count):
         elevation, distance = np.radians(45.0 + 27.0 * share), 0.45 - 0.28 * share
         azimuth = 0.6 + 0.1 * np.sin(8.0 * share)
         direction = np.array(
