@@ -45,6 +45,8 @@ from fixation_gym.types import FloatArray, MaskArray, Observation
 
 _OWN_DEPTHS = 5
 """Frames over which the motion of the target's own pixels is believed."""
+_HIDDEN_S = 1.0
+"""After this time out of sight the target's body may be anywhere, s."""
 _COVERED_S = 1.0
 """For this time after something covered or uncovered the target its centroid is not to be trusted, s."""
 
@@ -149,6 +151,7 @@ class Perception:
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
         self._covered_time = -math.inf
         self._body = TargetBody()
+        self._seen_time = -math.inf
 
     @property
     def flow_intrinsics(self) -> Intrinsics:
@@ -238,7 +241,9 @@ class Perception:
             return None
         seen, T_base_cam = now.segmentation, now.T_base_cam
         self._body = with_outline(self._body, seen, fixation, self._intrinsics, T_base_cam, height, settings)
-        return self._body.believed(T_base_cam, settings)
+        self._seen_time = now.time if seen.visible else self._seen_time
+        hidden = now.time - self._seen_time > _HIDDEN_S
+        return None if hidden else self._body.believed(T_base_cam, settings)
 
     def _inverse_distance(self, T_base_cam: FloatArray) -> InverseDepth:
         """Of the fixated object for a camera; 0 before it was seen."""

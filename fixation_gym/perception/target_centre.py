@@ -43,11 +43,16 @@ class CentreSettings:
     moved_misfit_px: float = 1.5
     """A known body that was moved fits its first outline as well as this, in the median."""
     doubts: int = 25
-    """The body is forgotten after so many frames in a row in which half of the outline is missing."""
+    """The body is forgotten after so many frames in sight, one by one, in which half of the outline is missing."""
     largest_half_size_m: float = 0.065
     """What is longer is two things that touch in the image."""
     believed_std_m: float = 0.006
     """Standard deviation of the centre along the optical axis up to which it is believed."""
+
+    def __post_init__(self) -> None:
+        least = max(4, self.least_outlines)
+        if self.max_outlines < least:
+            raise ValueError(f"max_outlines must be at least {least}, got {self.max_outlines}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +64,7 @@ class TargetBody:
     prior: BodyPrior | None = None
     """What is known of a body that has moved; None: nothing but what the outlines say."""
     doubts: int = 0
-    """Frames in a row in which half of the outline was missing."""
+    """Frames in sight, one after the other, in which half of the outline was missing."""
 
     def believed(self, T_base_cam: FloatArray, settings: CentreSettings) -> UprightBody | None:
         """The body, if its depth from this camera is sure enough."""

@@ -110,7 +110,7 @@ def outline_of(mask: MaskArray, intrinsics: Intrinsics, T_base_cam: FloatArray, 
 
     Args:
         mask: shape (H, W), not empty.
-        intrinsics: of the image.
+        intrinsics: of the image; pixels are taken for square.
         T_base_cam: camera pose in base, shape (4, 4).
         depth: about how far the body is, m.
     """
@@ -260,6 +260,6 @@ def _support_jacobian(parameters: FloatArray, normals: FloatArray) -> FloatArray
 
 
 _TINY = 1e-9
-"""Keeps logarithms of lengths finite, m."""
+"""Keeps logarithms finite."""
 _ANGLES = 2.0 * np.pi * np.arange(TANGENTS) / TANGENTS
 _DIRECTIONS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])

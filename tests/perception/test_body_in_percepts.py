@@ -14,15 +14,27 @@ CENTRE = np.array([0.5, -0.1, TABLE + HALF_SIZES[2]])
 POSES = approach(CENTRE, 50)
 
 
-def percept_after_an_approach(settings=None, support_height=TABLE):
-    """Of a red cylinder on a table of no colour."""
+RED = np.array([200, 10, 10], np.uint8)
+GREY = np.full((240, 320, 3), 128, np.uint8)
+
+
+def observation(time, rgb, pose):
+    return Observation(time, rgb, np.zeros(7), np.zeros(7), matrix_to_pose(pose), np.zeros(6), 0.08)
+
+
+def approached(settings=None, support_height=TABLE):
+    """Perception that saw a red cylinder on a grey table until 1.96 s."""
     perception = Perception(CAMERA, settings, support_height_m=support_height)
     points = surface("cylinder", HALF_SIZES, 0.0, CENTRE)
-    for index, pose in enumerate(POSES):
-        rgb = np.where(mask_of(points, pose)[..., None], np.array([200, 10, 10]), 128).astype(np.uint8)
-        time, still = 0.04 * index, np.zeros(7)
-        percept = perception.update(Observation(time, rgb, still, still, matrix_to_pose(pose), np.zeros(6), 0.08))
-    return percept
+    for index, pose in enumerate(POSES[:-1]):
+        rgb = np.where(mask_of(points, pose)[..., None], RED, GREY)
+        perception.update(observation(0.04 * index, rgb, pose))
+    return perception
+
+
+def percept_after_an_approach(settings=None, support_height=TABLE):
+    rgb = np.where(mask_of(surface("cylinder", HALF_SIZES, 0.0, CENTRE), POSES[-1])[..., None], RED, GREY)
+    return approached(settings, support_height).update(observation(2.0, rgb, POSES[-1]))
 
 
 def test_the_grasped_point_is_the_centre_of_the_body_and_not_of_the_surface_in_view():
@@ -33,6 +45,12 @@ def test_the_grasped_point_is_the_centre_of_the_body_and_not_of_the_surface_in_v
     axis = POSES[-1][:3, 2]
     reach = HALF_SIZES[0] * np.hypot(axis[0], axis[1]) + HALF_SIZES[2] * abs(axis[2])
     assert percept.reach_towards(POSES[-1]) == pytest.approx(reach, abs=0.001)
+
+
+def test_the_body_of_a_hidden_target_is_not_believed_for_long():
+    perception = approached()
+    for wait, believed in ((0.04, True), (0.9, True), (1.2, False)):
+        assert (perception.update(observation(2.0 + wait, GREY, POSES[-1])).body is not None) == believed
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ def test_a_body_that_stays_out_of_sight_for_the_most_part_is_forgotten():
     assert known.outlines == ()
 
 
-def test_two_things_that_touch_in_the_image_are_no_body_until_they_part():
+def test_what_is_too_long_for_one_thing_is_no_body_until_it_parts():
     poses = [pose for _ in range(2) for pose in approach(CENTRE)]
     known = TargetBody()
     for index, pose in enumerate(poses):
@@ -115,6 +115,11 @@ def test_two_things_that_touch_in_the_image_are_no_body_until_they_part():
         known = with_outline(known, seen, fixation, CAMERA, pose, TABLE, SETTINGS)
     assert known.body is not None
     assert np.linalg.norm(known.body.centre - CENTRE) < 0.002
+
+
+def test_a_limit_that_would_bound_nothing_is_refused():
+    with pytest.raises(ValueError, match="at least 6, got 5"):
+        CentreSettings(max_outlines=5)
 
 
 def test_without_sight_nothing_changes():
