@@ -57,6 +57,9 @@ class Scenario:
     """Probability that the target is pushed."""
     distractor: float = 0.0
     """Probability of a second object of the target's colour, which stays in its place."""
+    screen: float = 0.0
+    """Probability that a high glass screen close behind the target, which bars every way from above, takes the place of
+    the obstacles, which bar the straight way."""
 
     def __post_init__(self) -> None:
         _require_names("obstacle_kinds", self.obstacle_kinds, OBSTACLE_KINDS)
@@ -72,6 +75,7 @@ class Scenario:
         _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
         _require_probability("target_moves", self.target_moves)
         _require_probability("distractor", self.distractor)
+        _require_probability("screen", self.screen)
         high = self.obstacle_count[1]
         if not all(isinstance(count, int) for count in self.obstacle_count):
             raise ValueError(f"obstacle_count must be two whole numbers, got {self.obstacle_count}")
@@ -124,6 +128,7 @@ SCENARIOS: dict[str, Scenario] = {
             target_moves=0.3,
             distractor=0.3,
         ),
+        Scenario("screen", ("opaque", "translucent"), (2, 4), screen=0.5),
     )
 }
 SCENARIO_NAMES = tuple(SCENARIOS)

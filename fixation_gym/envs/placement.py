@@ -10,12 +10,14 @@ import numpy as np
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, obstacle_shape
-from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
+from fixation_gym.envs.scene import APPROACH_AZIMUTHS, TABLE_HEIGHT, ObstacleSpec
 from fixation_gym.types import FloatArray
 
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
 _PUSH_SPEED = 0.15
 """Speed of pushes, m/s."""
+_SCREEN_GAP = (0.065, 0.080)
+"""Range of the distance between the target's centre and the screen behind it, m."""
 _DRIVE_LENGTH = (0.08, 0.16)
 """Range of the length of a driven obstacle's way, m."""
 _TURN = 0.5
@@ -69,6 +71,28 @@ def sample_obstacle(
     return obstacle
 
 
+def sample_screen(scenario: Scenario, centre: FloatArray, rng: np.random.Generator) -> ObstacleSpec:
+    """Draw a screen close behind the target at ``centre``, shape (3,), in base, as seen from where the arm can be."""
+    shape = OBSTACLE_SHAPES["screen"][0]
+    scale = float(rng.uniform(0.85, 1.0))
+    bearing = math.atan2(centre[1], centre[0])
+    away = bearing + rng.uniform(APPROACH_AZIMUTHS[0], APPROACH_AZIMUTHS[-1])
+    radius, side = rng.uniform(*_SCREEN_GAP) + shape.half_extent[0] * scale, rng.uniform(-0.03, 0.03)
+    x = centre[0] + radius * math.cos(away) - side * math.sin(away)
+    y = centre[1] + radius * math.sin(away) + side * math.cos(away)
+    tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
+    return ObstacleSpec(
+        kind="screen",
+        shape=shape.name,
+        scale=scale,
+        position=(float(x), float(y), float(TABLE_HEIGHT + shape.half_extent[2] * scale)),
+        yaw=float(away + math.pi),
+        rgba=(float(tint[0]), float(tint[1]), float(tint[2]), float(rng.uniform(*scenario.alpha))),
+        texture=OBSTACLE_TEXTURES[0],
+        has_label=False,
+    )
+
+
 def sample_push(
     distance: tuple[float, float], start: tuple[float, float], angle: float, rng: np.random.Generator
 ) -> Motion:
@@ -86,12 +110,13 @@ def has_room(obstacle: ObstacleSpec, reds: FloatArray, others: list[ObstacleSpec
         reds: all places of target and distractor, shape (n, 3), in base, m.
         others: obstacles that are there already.
     """
-    ways, radius = _way(obstacle), _footprint_radius(obstacle)
+    ways, radius = _discs(obstacle)
     if not np.all((ways[:, 0] > 0.24) & (ways[:, 0] < 0.90) & (np.abs(ways[:, 1]) < 0.35)):
         return False
     if _nearest(ways, reds[:, :2]) < radius + 0.055:
         return False
-    return all(_nearest(ways, _way(other)) > radius + _footprint_radius(other) + 0.01 for other in others)
+    taken = [_discs(other) for other in others]
+    return all(_nearest(ways, places) > radius + other_radius + 0.01 for places, other_radius in taken)
 
 
 def _set_moving(
@@ -141,16 +166,20 @@ def _passes_through(obstacle: ObstacleSpec, camera: FloatArray, centre: FloatArr
     return bool(np.any(np.all(np.abs(points) < 0.85 * box.half_extent, axis=1)))
 
 
-def _way(obstacle: ObstacleSpec) -> FloatArray:
-    """Places of the obstacle on its way, shape (n, 2), in base, m."""
-    return np.array([box.centre[:2] for box in obstacle.boxes])
+def _discs(obstacle: ObstacleSpec) -> tuple[FloatArray, float]:
+    """Discs that cover the footprint at all places on its way: centres in base, shape (n, 2), and radius, m.
+
+    A screen is far wider than deep and takes several; one is enough for everything else.
+    """
+    centres = np.array([box.centre[:2] for box in obstacle.boxes])
+    half_x, half_y, _ = np.array(obstacle_shape(obstacle.kind, obstacle.shape).half_extent) * obstacle.scale
+    if obstacle.kind != "screen":
+        return centres, math.hypot(half_x, half_y)
+    count = 5
+    along = np.linspace(-1.0, 1.0, count)[:, None] * half_y * (1.0 - 1.0 / count)
+    return centres + along * (-math.sin(obstacle.yaw), math.cos(obstacle.yaw)), math.hypot(half_x, half_y / count)
 
 
 def _nearest(first: FloatArray, second: FloatArray) -> float:
     """Smallest distance between points, shapes (n, 2) and (m, 2), m."""
     return float(np.min(np.linalg.norm(first[:, None] - second[None], axis=-1)))
-
-
-def _footprint_radius(obstacle: ObstacleSpec) -> float:
-    half = obstacle_shape(obstacle.kind, obstacle.shape).half_extent
-    return math.hypot(half[0], half[1]) * obstacle.scale
