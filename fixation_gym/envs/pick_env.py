@@ -17,7 +17,8 @@ from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
 from fixation_gym.perception.drawing import draw_overlay
-from fixation_gym.perception.pipeline import Percept, Perception
+from fixation_gym.perception.percept import Percept
+from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import CAMERA_FOVY, HAND_EYE, TWIST_LIMITS
 from fixation_gym.types import FloatArray, ImageArray, Observation
 

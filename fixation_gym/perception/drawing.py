@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from fixation_gym.perception.pipeline import Percept
+from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow import UNKNOWN, obstacle_centre
 from fixation_gym.types import FloatArray, ImageArray
 

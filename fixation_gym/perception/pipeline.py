@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -14,8 +13,8 @@ from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import distance_filters as distance
 from fixation_gym.perception import kernels
-from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState, Fixation
-from fixation_gym.perception.fixation_constraint import ConstrainedGaze, ConstraintSettings
+from fixation_gym.perception.distance_filters import DistanceState, Fixation
+from fixation_gym.perception.fixation_constraint import ConstrainedGaze
 from fixation_gym.perception.following import Frame, follow_constraint, follow_poses, mean_variance, mended
 from fixation_gym.perception.gradients import FlowSettings
 from fixation_gym.perception.opencv_tracking import Window, expected_in, shifted, window_around
@@ -27,11 +26,13 @@ from fixation_gym.perception.optic_flow import (
     plane_homography,
     prepare_grey,
 )
+from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.scratch import Scratch
-from fixation_gym.perception.segmentation import RED, Colour, Segmentation, coloured_pixels, segment
-from fixation_gym.perception.target_centre import CentreSettings, TargetBody, with_outline
+from fixation_gym.perception.segmentation import Segmentation, coloured_pixels, segment
+from fixation_gym.perception.settings import PerceptionSettings
+from fixation_gym.perception.target_centre import TargetBody, with_outline
 from fixation_gym.perception.target_motion import InverseDepth, contradiction, target_inverse_depth
-from fixation_gym.perception.tracking import Expectation, Track, TrackingSettings, expected_at, followed
+from fixation_gym.perception.tracking import Expectation, Track, expected_at, followed
 from fixation_gym.perception.upright_body import UprightBody
 from fixation_gym.perception.zero_flow import (
     Gaze,
@@ -49,59 +50,6 @@ _HIDDEN_S = 1.0
 """After this time out of sight the target's body may be anywhere, s."""
 _COVERED_S = 1.0
 """For this time after something covered or uncovered the target its centroid is not to be trusted, s."""
-
-
-@dataclass(frozen=True, slots=True)
-class PerceptionSettings:
-    """Settings of every stage."""
-
-    colour: Colour = RED
-    """Colour of the target."""
-    tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    """How the target is told from other things of its colour."""
-    flow: FlowSettings = field(default_factory=FlowSettings)
-    """Resolution, windows and noise of the flow."""
-    distance: DistanceSettings = field(default_factory=DistanceSettings)
-    """Prior, noise and gates of the distance filter."""
-    constraint: ConstraintSettings | None = None
-    """If given, the distance comes from the paper's fixation constraint on the measured twist, for comparison; neither
-    poses and centroids nor the target's own motion have a say in it."""
-    centre: CentreSettings | None = field(default_factory=CentreSettings)
-    """How the centre of the target's body is found; None: the fixated point is taken for it. Needs a support height,
-    and is left out with ``constraint``."""
-    zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
-    """Margins and gates of the zero-flow test."""
-    max_gap_s: float = 0.15
-    """Frames farther apart than this are not differentiated, s."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Percept:
-    """All that perception says after one observation."""
-
-    time: float
-    """Time of the observation, s; ``segmentation`` and ``fixation`` belong to it."""
-    segmentation: Segmentation
-    """Target in the current image."""
-    flow: Flow
-    """Optic flow at the previous frame (``flow.time``)."""
-    zfc: ZeroFlow
-    """Zero-flow test at the previous frame: what is nearer than the fixated object."""
-    fixation: Fixation
-    """Where the fixated object is now."""
-    T_base_cam: FloatArray
-    """Camera pose in base at the time of ``flow`` and ``zfc``, shape (4, 4)."""
-    body: UprightBody | None = None
-    """The body whose surface is fixated; None while its centre is not sure."""
-
-    @property
-    def centre_base(self) -> FloatArray:
-        """Centre of the target in base, shape (3,), m: of its body if that is known, else the fixated point."""
-        return self.fixation.point_base if self.body is None else self.body.centre
-
-    def reach_towards(self, T_base_cam: FloatArray) -> float | None:
-        """How far the target's body reaches from its centre towards a camera, m; None if the body is not known."""
-        return None if self.body is None else self.body.reach(-T_base_cam[:3, 2])
 
 
 class Perception:

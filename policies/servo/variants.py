@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fixation_gym.control.gaze import GazeGains
 from fixation_gym.perception.evidence_map import ZeroFlowSettings
 from fixation_gym.perception.fixation_constraint import ConstraintSettings
-from fixation_gym.perception.pipeline import PerceptionSettings
+from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.tracking import TrackingSettings
 from policies.servo.gains import ServoGains
 

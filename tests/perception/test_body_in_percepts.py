@@ -6,7 +6,8 @@ from test_upright_body import CAMERA, TABLE, approach, mask_of, surface
 
 from fixation_gym.geometry.rigid import matrix_to_pose
 from fixation_gym.perception.fixation_constraint import ConstraintSettings
-from fixation_gym.perception.pipeline import Perception, PerceptionSettings
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.types import Observation
 
 HALF_SIZES = (0.03, 0.03, 0.04)

@@ -1,0 +1,37 @@
+"""Settings of all stages of perception in one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fixation_gym.perception.distance_filters import DistanceSettings
+from fixation_gym.perception.fixation_constraint import ConstraintSettings
+from fixation_gym.perception.gradients import FlowSettings
+from fixation_gym.perception.segmentation import RED, Colour
+from fixation_gym.perception.target_centre import CentreSettings
+from fixation_gym.perception.tracking import TrackingSettings
+from fixation_gym.perception.zero_flow import ZeroFlowSettings
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionSettings:
+    """Settings of every stage."""
+
+    colour: Colour = RED
+    """Colour of the target."""
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    """How the target is told from other things of its colour."""
+    flow: FlowSettings = field(default_factory=FlowSettings)
+    """Resolution, windows and noise of the flow."""
+    distance: DistanceSettings = field(default_factory=DistanceSettings)
+    """Prior, noise and gates of the distance filter."""
+    constraint: ConstraintSettings | None = None
+    """If given, the distance comes from the paper's fixation constraint on the measured twist, for comparison; neither
+    poses and centroids nor the target's own motion have a say in it."""
+    centre: CentreSettings | None = field(default_factory=CentreSettings)
+    """How the centre of the target's body is found; None: the fixated point is taken for it. Needs a support height,
+    and is left out with ``constraint``."""
+    zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
+    """Margins and gates of the zero-flow test."""
+    max_gap_s: float = 0.15
+    """Frames farther apart than this are not differentiated, s."""
