@@ -24,7 +24,7 @@ from policies.rl.agent_file import AgentCard, read_agent
 from policies.rl.config import CONFIGS
 from policies.rl.decisions import PERIODS, env_action
 from policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
-from policies.rl.inputs import STAGE, VIEWS, Memory, busy, input_space, network_inputs, remember
+from policies.rl.inputs import STAGE, VIEWS, Memory, blind_stage, busy, input_space, network_inputs, remember
 from policies.rl.residual import ResidualServo
 from policies.servo.servo_policy import ServoPolicy
 
@@ -42,12 +42,15 @@ class Decider:
     def reset(self) -> None:
         """Forget the last episode."""
         self._memory: Memory | None = None
+        self._looking = True
         self._periods = 0
         self._action = np.zeros(self._size, np.float32)
 
     def act(self, obs: Mapping[str, Any]) -> NDArray[np.float32]:
         """Output for an observation of ``FixationPickZFC-v0``: a new one when the last has been held long enough."""
-        self._memory = remember(self._memory, obs)
+        if self._looking:
+            self._memory = remember(self._memory, obs)
+        self._looking = not blind_stage(obs)  # in training the next image is not rendered then
         if busy(obs):
             self._periods = 0  # the first action after a manoeuvre is a new one
         else:

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -92,13 +93,14 @@ def _read(path: Path) -> tuple[AgentCard, bytes]:
             values, weights = json.loads(file.read(_CARD)), file.read(_WEIGHTS)
     except OSError as error:
         raise UsageError(f"cannot read the agent {path}: {error.strerror or error}") from error
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, NotImplementedError) as error:
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, KeyError, ValueError, EOFError) as error:
         raise _damaged(path) from error
     try:
         card = AgentCard(**{**values, "image_size": tuple(values["image_size"])})
+        known = card.config in CONFIGS and card.algorithm in ALGORITHMS
     except (TypeError, KeyError) as error:
         raise _damaged(path) from error
-    if card.format != FORMAT or card.config not in CONFIGS or card.algorithm not in ALGORITHMS:
+    if card.format != FORMAT or not known:
         raise UsageError(f"{path} is an agent of another version (format {card.format}, here {FORMAT}); train it anew")
     return card, weights
 

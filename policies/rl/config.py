@@ -48,8 +48,8 @@ class TrainConfig:
     """Time between checkpoints; another follows every evaluation."""
     learning_starts: int = 1_000
     """SAC: random decisions before learning begins."""
-    gradient_steps: int = 4
-    """SAC: per decision of all workers."""
+    gradient_steps: int = 1
+    """SAC: per decision."""
     buffer_size: int = 50_000
     """SAC: decisions kept."""
 
@@ -85,9 +85,12 @@ class TrainConfig:
         require_learning_packages()
 
     def identity(self) -> dict[str, Any]:
-        """What may not change between a run and its continuation, JSON-able: all but its length and its processes."""
+        """What may not change between a run and its continuation, JSON-able.
+
+        The number of workers may not, since a replay buffer has a column for each.
+        """
         values = asdict(self)
-        for name in ("steps", "workers", "eval_every", "checkpoint_minutes"):
+        for name in ("steps", "eval_every", "checkpoint_minutes"):
             del values[name]
         return {**values, "image_size": list(self.image_size)}
 

@@ -24,6 +24,7 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
     has ended and the next action counts: steps whose actions are ignored would teach nothing, and with random
     actions they are nearly all. While the tool goes in, the fingers close and lift, no image is rendered: it would be
     most of the time of a manoeuvre. So in training, and only there, a grasp does not follow a target that is pushed.
+    The memory of the view rests meanwhile, here and in agents.
     Rewards and ``info["reward_terms"]`` are summed; ``info["periods"]`` counts.
     """
 
@@ -49,7 +50,8 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
         total, terms, periods, grasping = 0.0, {}, 0, False
         while True:
             obs, reward, terminated, truncated, info = self.env.step(command)
-            self._memory = remember(self._memory, obs)
+            if self._base.camera_on:
+                self._memory = remember(self._memory, obs)
             total, periods = total + float(reward), periods + 1
             terms = {name: terms.get(name, 0.0) + value for name, value in info["reward_terms"].items()}
             was_grasping, grasping = grasping, busy(obs)

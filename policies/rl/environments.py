@@ -104,4 +104,6 @@ def worker_deaths(advice: Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except _DEATHS as error:
-        raise UsageError(f"a worker process died, perhaps for lack of memory; {advice()}") from error
+        raise UsageError(
+            f"a worker process ended: what it said is above, and if it said nothing memory may be short; {advice()}"
+        ) from error

@@ -17,7 +17,6 @@ SAC_SETTINGS: dict[str, Any] = {
     "train_freq": 1,
     "gradient_steps": 0,  # those of policies.rl.overlap take place while the environments step
     "ent_coef": "auto_0.1",
-    "target_entropy": -4.0,
     "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256]},
 }
 PPO_SETTINGS: dict[str, Any] = {

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,10 +45,10 @@ def train(config: TrainConfig, out: Path, resume: bool = False) -> dict[str, Any
         The summary, as in ``summary.json``.
 
     Raises:
-        UsageError: if the folder cannot be used, holds another run, or a worker process died.
+        UsageError: if the folder cannot be used, holds another run, the disk is full, or a worker process died.
     """
     make_folder(out)
-    with folder_lock(out):
+    with folder_lock(out), _writing(out):
         checkpoint = _check_folder(config, out, resume)
         progress = Progress() if checkpoint is None else read_progress(checkpoint)
         write_json(out / RUN_FILE, config.identity())
@@ -62,7 +64,6 @@ def summary_of(config: TrainConfig, progress: Progress) -> dict[str, Any]:
     """The content of ``summary.json``."""
     return {
         **config.identity(),
-        "workers": config.workers,
         "decisions": progress.decisions,
         "env_steps": progress.env_steps,
         "wall_s": progress.wall_s,
@@ -115,13 +116,14 @@ def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Pr
             draw_new_scenes(envs, config, progress.decisions)
             model.set_env(busy, force_reset=True)
             if isinstance(model, SAC):
-                learn_meanwhile(model, busy, config.gradient_steps)
+                learn_meanwhile(model, busy, config.gradient_steps * config.workers)
             piece = min(config.eval_every - progress.decisions % config.eval_every, config.steps - progress.decisions)
             model.learn(piece, callback=watch, reset_num_timesteps=False, tb_log_name="run")
             busy.meanwhile = None
             _evaluate(config, out, model, envs, progress)
+            # Before the checkpoint: a run that has its last one has an agent, too.
+            write_agent(out / FINAL_FILE, card_of(config, progress), agent_weights(model))
             save()
-        write_agent(out / FINAL_FILE, card_of(config, progress), agent_weights(model))
 
 
 def _bar(config: TrainConfig, progress: Progress) -> tqdm:
@@ -193,6 +195,15 @@ def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
     if not resume:
         raise UsageError(f"{out} holds a training run; add --resume to go on with it, or choose another --out")
     return checkpoint
+
+
+@contextlib.contextmanager
+def _writing(out: Path) -> Iterator[None]:
+    """Report what cannot be written, for lack of space or permission, as an error of use."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"cannot write to {out} ({error.strerror or error}); {_advice(out)}") from error
 
 
 def _advice(out: Path) -> str:

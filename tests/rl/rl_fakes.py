@@ -9,7 +9,10 @@ from fixation_gym.envs.zfc_observation import zfc_observation_space
 
 
 class FakeZFC(gym.Env):
-    """Stages of a manoeuvre after a trigger: 3 steps each of grasp, close, lift and recover. Rewards 1 per step."""
+    """Stages of a manoeuvre after a trigger: 3 steps each of grasp, close, lift and recover. Rewards 1 per step.
+
+    Its map changes with every step in which the camera is on.
+    """
 
     def __init__(self, length=1000, dies_at=None):
         self.observation_space = zfc_observation_space("zfc", (64, 80))
@@ -21,7 +24,7 @@ class FakeZFC(gym.Env):
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
         self.seeds = [*getattr(self, "seeds", []), seed]
-        self.count, self.left = 0, 0
+        self.count, self.left, self.camera_on, self.level = 0, 0, True, 0
         return self._obs(), self._info()
 
     def step(self, action):
@@ -30,6 +33,8 @@ class FakeZFC(gym.Env):
             os._exit(1)
         self.actions.append(np.array(action))
         self.cameras.append(self.camera_on)
+        if self.camera_on:
+            self.level = min(self.count, 255)
         self.left = 12 if self.left == 0 and action[3] > 0 else max(0, self.left - 1)
         return self._obs(), 1.0, False, self.count >= self.length, self._info()
 
@@ -37,7 +42,7 @@ class FakeZFC(gym.Env):
         proprio = np.zeros(24, np.float32)
         if self.left:
             proprio[20 + (12 - self.left) // 3] = 1.0
-        cells = np.full((1, 32, 32), min(self.count, 255), np.uint8)
+        cells = np.full((1, 32, 32), self.level, np.uint8)
         return {"zfc_map": cells, "fixation": np.array([0, 0, 1, 0.4, 0.01], np.float32), "proprio": proprio}
 
     def _info(self):

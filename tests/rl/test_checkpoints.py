@@ -116,7 +116,7 @@ def test_bad_options_end_in_one_line(tmp_path, options, message, capsys):
     ],
 )
 def test_a_folder_with_a_run_is_not_mixed_with_another(tmp_path, options, message, capsys):
-    write_json(tmp_path / RUN_FILE, TrainConfig(steps=99, workers=3).identity())
+    write_json(tmp_path / RUN_FILE, TrainConfig(steps=99).identity())
     before = json.loads((tmp_path / RUN_FILE).read_text())
     assert train(*options, "--out", str(tmp_path)) == 2
     assert message in capsys.readouterr().err
@@ -136,6 +136,6 @@ def step_until_death(envs):
 
 def test_a_killed_worker_is_reported_and_the_others_end():
     envs = SubprocVecEnv([fake_env, dying_env], start_method="spawn")
-    with pytest.raises(UsageError, match=r"a worker process died.*; go on"):
+    with pytest.raises(UsageError, match=r"a worker process ended.*; go on"):
         step_until_death(envs)
     assert not any(process.is_alive() for process in envs.processes)

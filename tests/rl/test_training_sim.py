@@ -38,7 +38,7 @@ def killed_and_resumed(tmp_path_factory):
 
     training.save_checkpoint = save_and_die
     try:
-        with pytest.raises(UsageError, match=r"a worker process died.*--resume goes on from checkpoint-0000000012"):
+        with pytest.raises(UsageError, match=r"a worker process ended.*--resume goes on from checkpoint-0000000012"):
             train(SHORT, folder)
     finally:
         training.save_checkpoint = save
