@@ -76,7 +76,7 @@ class Compare:
     """Train and test configurations over seeds: learning curves, final table. The same command again resumes."""
 
     config: str = "zfc,blind,rgb,residual"
-    """Configurations, separated by commas."""
+    """Configurations, separated by commas; the others are compared with the first, seed by seed."""
     seeds: int = 5
     """Training seeds of every configuration, from 0 on."""
     steps: int = 6_000
@@ -88,7 +88,8 @@ class Compare:
     episodes: int = 50
     """Episodes per test scenario and agent; the same for all."""
     quick: bool = False
-    """Two seeds of zfc and blind, 600 decisions each, 8 episodes: minutes, to see that everything works."""
+    """Two seeds of zfc and blind, 600 decisions each, 8 episodes, whatever the options above say: minutes, to see
+    that everything works."""
     env_workers: int = 4
     """Processes that step the environments of one training run."""
     workers: int = 1
@@ -104,7 +105,14 @@ class Compare:
 
         require_learning_packages()
         from policies.rl.compare import QUICK, CompareConfig, compare
-        from policies.rl.comparison_tables import CURVES_FILE, FIGURE_FILE, TABLE_FILE, format_table
+        from policies.rl.comparison_tables import (
+            CURVES_FILE,
+            DIFFERENCES_FILE,
+            FIGURE_FILE,
+            TABLE_FILE,
+            format_differences,
+            format_table,
+        )
 
         training = QUICK if self.quick else TrainConfig(steps=self.steps)
         config = CompareConfig(
@@ -120,6 +128,8 @@ class Compare:
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
 
-        print(format_table(compare(config, self.out)["table"]))
-        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, TABLE_FILE, CURVES_FILE, FIGURE_FILE)))
+        summary = compare(config, self.out)
+        print(f"{format_table(summary['table'])}\n\n{format_differences(summary['differences'])}\n")
+        for name in (SUMMARY_FILE, TABLE_FILE, DIFFERENCES_FILE, CURVES_FILE, FIGURE_FILE):
+            print(self.out / name)
         return 0

@@ -16,7 +16,16 @@ from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, ResultStore, write_json
 from policies.catalogue import surroundings
-from policies.rl.comparison_tables import CURVES_FILE, FIGURE_FILE, TABLE_FILE, curves_of, table_of, write_csv
+from policies.rl.comparison_tables import (
+    CURVES_FILE,
+    DIFFERENCES_FILE,
+    FIGURE_FILE,
+    TABLE_FILE,
+    curves_of,
+    differences_of,
+    table_of,
+    write_csv,
+)
 from policies.rl.config import CONFIGS, TrainConfig
 
 RUNS_FOLDER = "runs"
@@ -142,6 +151,7 @@ def compare(
         summary = summary_of(config, results, time.monotonic() - started)
         write_csv(out / CURVES_FILE, summary["curves"])
         write_csv(out / TABLE_FILE, summary["table"])
+        write_csv(out / DIFFERENCES_FILE, summary["differences"])
         write_json(out / SUMMARY_FILE, summary)
     from policies.rl.comparison_figure import draw_comparison
 
@@ -157,6 +167,7 @@ def summary_of(config: CompareConfig, results: Sequence[dict[str, Any]], wall_s:
         "training": {**asdict(config.training), "image_size": list(config.training.image_size)},
         "test": {"scenarios": list(config.scenarios), "episodes": config.episodes, "seed": TEST_SEED},
         "table": table_of(results),
+        "differences": differences_of(results, config.configs[0]),
         "curves": curves_of(results),
         "runs": list(results),
         "versions": installed_versions(),

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from fixation_gym.evaluation.statistics import wilson_interval
 from fixation_gym.evaluation.video import write_file
 from policies.rl.aggregates import bootstrap_interval, interquartile_mean
 
-CURVES_FILE, TABLE_FILE, FIGURE_FILE = "curves.csv", "table.csv", "comparison.png"
+CURVES_FILE, TABLE_FILE, DIFFERENCES_FILE, FIGURE_FILE = "curves.csv", "table.csv", "differences.csv", "comparison.png"
 MEASURES = {"success": "successes", "collision_free": "collision_free_successes"}
 """Names of rates, and the counts that they come from."""
 ALL = "all"
@@ -43,20 +44,63 @@ def curves_of(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def table_of(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row per configuration and scenario, and one over all scenarios if there are several."""
-    rows = []
+    """One row per configuration and scenario, and one over all scenarios if there are several.
+
+    Rates are interquartile means over seeds with intervals of the bootstrap over seeds. What has one seed only, such as
+    the servo, has Wilson intervals over episodes instead.
+    """
+    rows: list[dict[str, Any]] = []
     for config in _configs(results):
         runs = [result["scenarios"] for result in results if result["config"] == config]
         scenarios = list(runs[0])
         for name in [*scenarios, *([ALL] if len(scenarios) > 1 else [])]:
             chosen = scenarios if name == ALL else [name]
-            row: dict[str, Any] = {"config": config, "scenario": name, "seeds": len(runs)}
-            row["episodes"] = sum(run[scenario]["episodes"] for run in runs for scenario in chosen)
+            episodes = sum(run[scenario]["episodes"] for run in runs for scenario in chosen)
+            row: dict[str, Any] = {"config": config, "scenario": name, "seeds": len(runs), "episodes": episodes}
             for measure, count in MEASURES.items():
-                rates = [[run[scenario][count] / run[scenario]["episodes"] for scenario in chosen] for run in runs]
-                row |= _aggregate(measure, np.array(rates))
+                if len(runs) > 1:
+                    row |= _aggregate(measure, _rates(runs, chosen, count))
+                    continue
+                successes = sum(runs[0][scenario][count] for scenario in chosen)
+                low, high = wilson_interval(successes, episodes)
+                row |= {measure: successes / episodes, f"{measure}_low": low, f"{measure}_high": high}
             rows.append(row)
     return rows
+
+
+def differences_of(results: Sequence[dict[str, Any]], reference: str) -> list[dict[str, Any]]:
+    """One row per other learner and scenario: rates of ``reference`` minus its own, paired by seed.
+
+    Means over the seeds that both have, with intervals of the bootstrap over them.
+    """
+    runs = {(result["config"], result["seed"]): result["scenarios"] for result in results if result["curve"]}
+    rows = []
+    for other in _configs([result for result in results if result["curve"] and result["config"] != reference]):
+        seeds = [seed for config, seed in runs if config == other and (reference, seed) in runs]
+        if not seeds:
+            continue
+        for name in runs[reference, seeds[0]]:
+            row: dict[str, Any] = {"config": reference, "minus": other, "scenario": name, "seeds": len(seeds)}
+            for measure, count in MEASURES.items():
+                ours, theirs = (
+                    _rates([runs[config, seed] for seed in seeds], [name], count) for config in (reference, other)
+                )
+                low, high = bootstrap_interval(ours - theirs, lambda scores: float(np.mean(scores)))
+                row |= {measure: float(np.mean(ours - theirs)), f"{measure}_low": low, f"{measure}_high": high}
+            rows.append(row)
+    return rows
+
+
+def format_differences(rows: Sequence[dict[str, Any]]) -> str:
+    """The differences for people, in percentage points with their intervals."""
+    lines = []
+    for row in rows:
+        cells = "".join(
+            f"{100 * row[measure]:+11.0f} [{100 * row[measure + '_low']:+4.0f}, {100 * row[measure + '_high']:+4.0f}]"
+            for measure in MEASURES
+        )
+        lines.append(f"{row['config'] + ' - ' + row['minus']:18}{row['scenario']:12}{row['seeds']:6}{cells}")
+    return "\n".join(lines)
 
 
 def format_table(rows: Sequence[dict[str, Any]]) -> str:
@@ -82,6 +126,11 @@ def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 def _configs(results: Sequence[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(result["config"] for result in results))
+
+
+def _rates(runs: Sequence[dict[str, Any]], scenarios: Sequence[str], count: str) -> np.ndarray:
+    """Rates of runs in scenarios, shape (runs, scenarios)."""
+    return np.array([[run[scenario][count] / run[scenario]["episodes"] for scenario in scenarios] for run in runs])
 
 
 def _aggregate(measure: str, scores: np.ndarray) -> dict[str, float]:

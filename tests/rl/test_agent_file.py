@@ -4,6 +4,7 @@ import io
 import json
 import os
 import zipfile
+from dataclasses import asdict
 
 import pytest
 import torch
@@ -71,6 +72,18 @@ def damage_other_version(path):
     rewrite(path, **{"agent.json": json.dumps({**card, "format": 99})})
 
 
+def damage_flipped(path):
+    data = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as file:
+        begin = file.getinfo("actor.pth").header_offset + 50
+    data[begin : begin + 40] = bytes(byte ^ 0xFF for byte in data[begin : begin + 40])
+    path.write_bytes(data)
+
+
+def damage_names(path):
+    rewrite(path, **{"agent.json": json.dumps({**asdict(CARD), "config": ["zfc"]})})
+
+
 def damage_card(path):
     rewrite(path, **{"agent.json": '{"config": "zfc"}'})
 
@@ -84,6 +97,8 @@ def damage_card(path):
         (damage_foreign, "no agent: `fixation-gym train` writes those"),
         (damage_other_version, "agent of another version"),
         (damage_card, "is damaged or no agent"),
+        (damage_names, "is damaged or no agent"),
+        (damage_flipped, "is damaged or no agent"),
     ],
 )
 def test_evaluate_says_in_one_line_what_is_wrong_with_a_file(agent, damage, message, capsys, tmp_path):

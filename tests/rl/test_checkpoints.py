@@ -1,5 +1,6 @@
 """Checkpoints: whole or not there, the last good one stays, and a run goes on from it as it was."""
 
+import errno
 import json
 import resource
 
@@ -12,6 +13,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.storage import RUN_FILE, write_json
+from policies.rl import train as training
 from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
 from policies.rl.config import TrainConfig
 from policies.rl.decisions import DecisionEnv
@@ -121,6 +123,18 @@ def test_a_folder_with_a_run_is_not_mixed_with_another(tmp_path, options, messag
     assert train(*options, "--out", str(tmp_path)) == 2
     assert message in capsys.readouterr().err
     assert json.loads((tmp_path / RUN_FILE).read_text()) == before
+
+
+def test_a_disk_that_fills_up_is_reported_in_one_line_with_what_is_left(tmp_path, monkeypatch, capsys):
+    def learn(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(training, "_learn", learn)
+    assert train("--out", str(tmp_path / "run")) == 2
+    error = capsys.readouterr().err
+    assert "cannot write to" in error
+    assert "(No space left on device); there is no checkpoint yet" in error
+    assert len(error.splitlines()) == 1
 
 
 def dying_env():

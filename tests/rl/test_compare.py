@@ -9,7 +9,7 @@ import pytest
 
 from fixation_gym.errors import UsageError
 from policies.rl.compare import SERVO, CompareConfig, compare
-from policies.rl.comparison_tables import format_table
+from policies.rl.comparison_tables import format_differences, format_table
 from policies.rl.config import TrainConfig
 
 CONFIG = CompareConfig(configs=("zfc", "blind"), seeds=4, scenarios=("clear", "mixed"), episodes=10)
@@ -44,11 +44,19 @@ def test_tables_and_curves_are_the_aggregates_of_the_runs(tmp_path):
     assert (row["seeds"], row["episodes"], row["success"]) == (4, 40, 0.8)
     assert row["collision_free"] == pytest.approx(0.65)  # the middle two of 0.8, 0.7, 0.6, 0.5
     assert 0.5 <= row["collision_free_low"] < 0.65 < row["collision_free_high"] <= 0.8
+    difference = next(row for row in summary["differences"] if row["scenario"] == "mixed")
+    assert (difference["config"], difference["minus"], difference["seeds"]) == ("zfc", "blind", 4)
+    assert difference["success"] == difference["success_low"] == difference["success_high"] == pytest.approx(0.3)
     point = next(point for point in summary["curves"] if point["config"] == "blind" and point["decisions"] == 2)
     assert (point["env_steps"], point["wall_min"], point["success"]) == (19.5, 2.0, pytest.approx(0.2))
     assert SERVO not in {point["config"] for point in summary["curves"]}
     with (tmp_path / "table.csv").open() as file:
         assert [row["config"] for row in csv.DictReader(file)] == [SERVO] * 3 + ["zfc"] * 3 + ["blind"] * 3
+    with (tmp_path / "differences.csv").open() as file:
+        assert [(row["minus"], row["scenario"]) for row in csv.DictReader(file)] == [
+            ("blind", "clear"),
+            ("blind", "mixed"),
+        ]
     assert (tmp_path / "comparison.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -103,9 +111,13 @@ def test_a_backend_finds_what_this_process_finds(tmp_path, backend, request):
 
 
 def test_the_table_for_people_has_percents_and_intervals(tmp_path):
-    lines = format_table(compare(CONFIG, tmp_path, run_fake_cell)["table"]).splitlines()
+    summary = compare(CONFIG, tmp_path, run_fake_cell)
+    lines = format_table(summary["table"]).splitlines()
     assert len(lines) == 10
-    assert " ".join(lines[1].split()) == "servo clear 1 90 [ 90, 90] 90 [ 90, 90]"
+    assert " ".join(lines[1].split()) == "servo clear 1 90 [ 60, 98] 90 [ 60, 98]"  # Wilson's of 9 in 10
+    assert format_differences(summary["differences"]).splitlines()[1].split() == (
+        ["zfc", "-", "blind", "mixed", "4", "+30", "[", "+30,", "+30]", "+30", "[", "+30,", "+30]"]
+    )
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,7 @@ def killed_and_resumed(tmp_path_factory):
             train(SHORT, folder)
     finally:
         training.save_checkpoint = save
+    assert (folder / FINAL_FILE).exists()  # written before the checkpoint: a run that ends here would need no resume
     return train(SHORT, folder, resume=True), folder
 
 
