@@ -57,9 +57,9 @@ class Scenario:
     """Probability that the target is pushed."""
     distractor: float = 0.0
     """Probability of a second object of the target's colour, which stays in its place."""
-    screen: float = 0.0
-    """Probability that a high glass screen close behind the target, which bars every way from above, takes the place of
-    the obstacles, which bar the straight way."""
+    screen: bool = False
+    """Whether the one obstacle is a glass screen close to the target: in half of the scenes a low one in front of it,
+    which bars low ways, in the others a high one behind it, which bars ways from above."""
 
     def __post_init__(self) -> None:
         _require_names("obstacle_kinds", self.obstacle_kinds, OBSTACLE_KINDS)
@@ -75,7 +75,10 @@ class Scenario:
         _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
         _require_probability("target_moves", self.target_moves)
         _require_probability("distractor", self.distractor)
-        _require_probability("screen", self.screen)
+        if not isinstance(self.screen, bool):
+            raise ValueError(f"screen must be true or false, got {self.screen!r}")
+        if self.screen and self.obstacle_count != (0, 0):
+            raise ValueError(f"screen stands alone: obstacle_count must be (0, 0), got {self.obstacle_count}")
         high = self.obstacle_count[1]
         if not all(isinstance(count, int) for count in self.obstacle_count):
             raise ValueError(f"obstacle_count must be two whole numbers, got {self.obstacle_count}")
@@ -128,7 +131,7 @@ SCENARIOS: dict[str, Scenario] = {
             target_moves=0.3,
             distractor=0.3,
         ),
-        Scenario("screen", ("opaque", "translucent"), (2, 4), screen=0.5),
+        Scenario("screen", screen=True),
     )
 }
 SCENARIO_NAMES = tuple(SCENARIOS)

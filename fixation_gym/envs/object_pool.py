@@ -76,8 +76,8 @@ def _framed_panel(half_y: float, half_z: float, face: Part) -> tuple[Part, ...]:
     )
 
 
-def _glass_screen(half_y: float, half_z: float) -> Shape:
-    """A high pane whose foot is all behind it, so that it can stand close to something."""
+def _glass_screen(name: str, half_y: float, half_z: float) -> Shape:
+    """A pane whose foot is all behind it, so that it can stand close to something."""
     bar, half_x = 0.006, 0.035
     front = half_x - bar
     parts = (
@@ -87,7 +87,7 @@ def _glass_screen(half_y: float, half_z: float) -> Shape:
         Part("box", (bar, half_y, bar), (front, 0.0, half_z - bar), finish="rim"),
         Part("box", (half_x, half_y, bar), (0.0, 0.0, bar - half_z), finish="rim"),
     )
-    return Shape("screen", parts, (half_x, half_y, half_z), 0.8)
+    return Shape(name, parts, (half_x, half_y, half_z), 0.8)
 
 
 TARGET_SHAPES: tuple[Shape, ...] = (
@@ -155,7 +155,7 @@ OBSTACLE_SHAPES: dict[str, tuple[Shape, ...]] = {
         ),
     ),
     "wire": (Shape("cage", _cage(0.055, 0.065, 0.090, 0.003), (0.055, 0.065, 0.090), 0.5),),
-    "screen": (_glass_screen(0.130, 0.120),),
+    "screen": (_glass_screen("high", 0.130, 0.120), _glass_screen("low", 0.130, 0.060)),
 }
 OBSTACLE_KINDS = tuple(kind for kind in OBSTACLE_SHAPES if kind != "screen")
 """Kinds that may stand anywhere; a screen stands close behind the target only."""

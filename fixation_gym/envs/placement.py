@@ -10,14 +10,18 @@ import numpy as np
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, obstacle_shape
-from fixation_gym.envs.scene import APPROACH_AZIMUTHS, TABLE_HEIGHT, ObstacleSpec
+from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
 from fixation_gym.types import FloatArray
 
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
 _PUSH_SPEED = 0.15
 """Speed of pushes, m/s."""
-_SCREEN_GAP = (0.065, 0.080)
-"""Range of the distance between the target's centre and the screen behind it, m."""
+_SCREEN_GAPS = {"low": (0.100, 0.115), "high": (0.060, 0.075)}
+"""Ranges of the distance between the target's centre and a low screen in front, or a high one behind it, m."""
+_SCREEN_AZIMUTH = math.radians(45.0)
+"""Of the middle of the directions from which the arm comes, against the direction from base to target, rad."""
+_SCREEN_TURN = 0.2
+"""Largest angle between that direction and the normal of the screen, rad."""
 _DRIVE_LENGTH = (0.08, 0.16)
 """Range of the length of a driven obstacle's way, m."""
 _TURN = 0.5
@@ -71,22 +75,28 @@ def sample_obstacle(
     return obstacle
 
 
-def sample_screen(scenario: Scenario, centre: FloatArray, rng: np.random.Generator) -> ObstacleSpec:
-    """Draw a screen close behind the target at ``centre``, shape (3,), in base, as seen from where the arm can be."""
-    shape = OBSTACLE_SHAPES["screen"][0]
-    scale = float(rng.uniform(0.85, 1.0))
-    bearing = math.atan2(centre[1], centre[0])
-    away = bearing + rng.uniform(APPROACH_AZIMUTHS[0], APPROACH_AZIMUTHS[-1])
-    radius, side = rng.uniform(*_SCREEN_GAP) + shape.half_extent[0] * scale, rng.uniform(-0.03, 0.03)
-    x = centre[0] + radius * math.cos(away) - side * math.sin(away)
-    y = centre[1] + radius * math.sin(away) + side * math.cos(away)
+def sample_screen(scenario: Scenario, name: str, centre: FloatArray, rng: np.random.Generator) -> ObstacleSpec:
+    """Draw a screen close to the target, as seen from where the arm comes.
+
+    Args:
+        scenario: with the range of the opacity.
+        name: "low", in front of the target, or "high", behind it.
+        centre: of the target, shape (3,), in base, m.
+        rng: generator.
+    """
+    shape = obstacle_shape("screen", name)
+    beyond = math.atan2(centre[1], centre[0]) + _SCREEN_AZIMUTH + rng.uniform(-_SCREEN_TURN, _SCREEN_TURN)
+    bearing = beyond if name == "high" else beyond + math.pi
+    radius, side = rng.uniform(*_SCREEN_GAPS[name]) + shape.half_extent[0], rng.uniform(-0.03, 0.03)
+    x = centre[0] + radius * math.cos(bearing) - side * math.sin(bearing)
+    y = centre[1] + radius * math.sin(bearing) + side * math.cos(bearing)
     tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
     return ObstacleSpec(
         kind="screen",
-        shape=shape.name,
-        scale=scale,
-        position=(float(x), float(y), float(TABLE_HEIGHT + shape.half_extent[2] * scale)),
-        yaw=float(away + math.pi),
+        shape=name,
+        scale=1.0,
+        position=(float(x), float(y), TABLE_HEIGHT + shape.half_extent[2]),
+        yaw=float(bearing + math.pi),
         rgba=(float(tint[0]), float(tint[1]), float(tint[2]), float(rng.uniform(*scenario.alpha))),
         texture=OBSTACLE_TEXTURES[0],
         has_label=False,

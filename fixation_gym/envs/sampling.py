@@ -1,4 +1,4 @@
-"""Sampling of scenes: something hinders the straight approach, or the one from above, yet some approach is free.
+"""Sampling of scenes: something hinders the straight approach, or that from above, yet some approach is free.
 
 Pure: one generator in, one value out. A scene is proposed part by part and rejected as a whole, so every part is drawn
 as if the others were not there.
@@ -35,8 +35,8 @@ _LEAST_FREE = 0.2
 """Least share of the reachable directions that must be free with ``_CLEARANCE`` m to spare."""
 _CLIMBS = np.radians([0.0, 5.0, 10.0, 15.0])
 """Rises of the hand on its way, as servo policies climb, along all of which the straight approach must be hindered."""
-_STEEP = np.radians([75.0, 80.0, 85.0])
-"""Elevations of the ways from above that a screen must bar."""
+_LOW, _STEEP = np.radians([45.0, 50.0, 55.0]), np.radians([75.0, 79.0, 83.0])
+"""Elevations of low ways and of those from above: a screen must bar all of one kind and leave some of the other."""
 _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
 _START_ROOM = 0.10
@@ -47,14 +47,14 @@ _ATTEMPTS = 1000
 def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
     """Draw a scene in which something hinders the straight approach, yet some approach is free all the time.
 
-    With a screen it is the approach from above that is hindered.
+    With a high screen it is the approach from above that is hindered.
 
     Raises:
         RuntimeError: if the scenario's sizes leave no room for such a scene.
     """
-    with_screen = scenario.screen > 0.0 and rng.random() < scenario.screen
+    screen = str(rng.choice(("low", "high"))) if scenario.screen else None
     for _ in range(_ATTEMPTS):
-        scene = _propose(scenario, with_screen, rng)
+        scene = _propose(scenario, screen, rng)
         if scene is not None:
             return scene
     raise RuntimeError(
@@ -62,7 +62,7 @@ def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
     )
 
 
-def _propose(scenario: Scenario, with_screen: bool, rng: np.random.Generator) -> SceneSpec | None:
+def _propose(scenario: Scenario, screen: str | None, rng: np.random.Generator) -> SceneSpec | None:
     target = _sample_target(scenario, rng)
     centre = np.array(target.position)
     camera, gaze = _sample_view(scenario, centre, rng)
@@ -73,12 +73,12 @@ def _propose(scenario: Scenario, with_screen: bool, rng: np.random.Generator) ->
         distractor = _sample_distractor(scenario, target, rng)
         if not _told_apart(target, distractor, camera, gaze):
             return None
-    obstacles = _sample_obstacles(scenario, target, distractor, camera, with_screen, rng)
-    if obstacles is None or not _is_solvable(target, distractor, obstacles):
+    obstacles = _sample_obstacles(scenario, target, distractor, camera, screen, rng)
+    if obstacles is None or not (screen or _is_solvable(target, distractor, obstacles)):
         return None
     if obstacles and not _has_start_room(obstacles, camera, gaze):
         return None
-    if obstacles and not (_bars_above(target, obstacles) if with_screen else _hinders(target, obstacles, camera)):
+    if obstacles and not (_decides(target, obstacles, screen) if screen else _hinders(target, obstacles, camera)):
         return None
     light = rng.uniform(-0.5, 0.5, 2)
     return SceneSpec(
@@ -117,12 +117,18 @@ def _hinders(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...], camera: Fl
     return not free_directions(centre, boxes, ways, 0.0).any()
 
 
-def _bars_above(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...]) -> bool:
-    """Whether all steep ways are blocked, wherever the target is."""
+def _decides(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...], screen: str) -> bool:
+    """Whether a low screen bars all low ways and leaves some from above, or a high one the other way round."""
     boxes = [box for obstacle in obstacles for box in obstacle.boxes]
     bearing = math.atan2(target.position[1], target.position[0])
-    ways = approach_directions(bearing + APPROACH_AZIMUTHS, _STEEP)
-    return not any(free_directions(place, boxes, ways, 0.0).any() for place in target.places[[0, -1]])
+    barred, left = (_LOW, _STEEP) if screen == "low" else (_STEEP, _LOW)
+    for place in target.places[[0, -1]]:
+        if free_directions(place, boxes, approach_directions(bearing + APPROACH_AZIMUTHS, barred), 0.0).any():
+            return False
+        ways = approach_directions(bearing + APPROACH_AZIMUTHS, left)
+        if free_directions(place, boxes, ways, 0.0).mean() < _LEAST_FREE:
+            return False
+    return True
 
 
 def _has_start_room(obstacles: tuple[ObstacleSpec, ...], camera: FloatArray, gaze: FloatArray) -> bool:
@@ -208,7 +214,7 @@ def _sample_obstacles(
     target: TargetSpec,
     distractor: TargetSpec | None,
     camera: FloatArray,
-    with_screen: bool,
+    screen: str | None,
     rng: np.random.Generator,
 ) -> tuple[ObstacleSpec, ...] | None:
     """Obstacles with room for each, or a screen alone; None if there is no room."""
@@ -216,9 +222,9 @@ def _sample_obstacles(
     reds = target.places if distractor is None else np.concatenate([target.places, distractor.places])
     if distractor is not None and np.linalg.norm(target.places - distractor.position, axis=1).min() < 0.10:
         return None
-    if with_screen:
-        screen = sample_screen(scenario, np.array(target.position), rng)
-        return (screen,) if has_room(screen, reds, []) else None
+    if screen is not None:
+        alone = sample_screen(scenario, screen, np.array(target.position), rng)
+        return (alone,) if has_room(alone, reds, []) else None
     obstacles: list[ObstacleSpec] = []
     for index in range(count):
         kind = str(rng.choice(scenario.obstacle_kinds))

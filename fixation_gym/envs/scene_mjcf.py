@@ -73,8 +73,8 @@ def add_object_pool(worldbody: ET.Element) -> None:
     for slot in range(MAX_OBSTACLES):
         body = _free_body(worldbody, f"obstacle{slot}")
         for kind, shapes in OBSTACLE_SHAPES.items():
-            if kind == "mirror" and slot > 0:
-                continue  # MuJoCo draws the reflection of one geom only
+            if kind in ("mirror", "screen") and slot > 0:
+                continue  # MuJoCo draws the reflection of one geom only; a screen stands alone
             for shape in shapes:
                 _add_parts(body, f"obstacle{slot}", shape)
 

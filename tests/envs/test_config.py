@@ -20,6 +20,8 @@ def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
         ({"obstacles": 3}, "obstacle_count"),
         ({"obstacle_count": [0, 9], "obstacle_kinds": ["opaque"]}, "within 0..4"),
         ({"obstacle_count": [1, 1]}, "obstacle_kinds"),
+        ({"screen": 0.5}, "true or false"),
+        ({"base": "opaque", "screen": True}, r"obstacle_count must be \(0, 0\)"),
         ({"target_shapes": ["teapot"]}, "duck"),
         ({"target_shapes": 3}, "list of names"),
         ({"obstacle_kinds": "opaque"}, "list of names"),

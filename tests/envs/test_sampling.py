@@ -18,10 +18,6 @@ def scenes(name, count=20):
     return [sample_scene(SCENARIOS[name], rng) for _ in range(count)]
 
 
-def has_screen(scene):
-    return any(obstacle.kind == "screen" for obstacle in scene.obstacles)
-
-
 def azimuths(target):
     """Azimuths that the arm can take up around a target, and some beyond, rad."""
     return np.arctan2(target[1], target[0]) + np.radians(np.linspace(0.0, 85.0, 8))
@@ -36,7 +32,7 @@ def test_scenes_stand_on_the_table_apart_from_each_other(name):
         assert 0.025 <= 2 * target_shape(target.shape).half_extent[1] * target.scale[1] <= 0.07 + 1e-9
         assert max(target.scale) <= 1.0
         count_low, count_high = SCENARIOS[name].obstacle_count
-        if not has_screen(scene):
+        if not SCENARIOS[name].screen:
             assert count_low <= len(scene.obstacles) <= count_high
         for obstacle in scene.obstacles:
             half = obstacle_shape(obstacle.kind, obstacle.shape).half_extent[2] * obstacle.scale
@@ -62,31 +58,33 @@ def test_the_first_way_is_blocked_and_others_stay_free_whatever_moves(name):
             boxes = [box for obstacle in scene.obstacles for box in obstacle.boxes]
             assert free_directions(end, boxes, reachable_directions(end), 0.01).mean() >= 0.2
         start = np.array(scene.camera_position) - scene.target.places[-1]
-        if not has_screen(scene):
-            assert not free_directions(scene.target.places[-1], boxes, start[None] / np.linalg.norm(start), 0.0)[0]
+        assert not free_directions(scene.target.places[-1], boxes, start[None] / np.linalg.norm(start), 0.0)[0]
 
 
-def test_a_screen_stands_alone_close_behind_the_target_and_bars_the_way_from_above():
-    with_screen = [scene for scene in scenes("screen", 40) if has_screen(scene)]
-    assert 10 <= len(with_screen) <= 30
-    for scene in with_screen:
+def test_a_screen_stands_alone_close_to_the_target_low_in_front_or_high_behind():
+    sides = {"low": 0, "high": 0}
+    for scene in scenes("screen", 40):
         (screen,) = scene.obstacles
-        target = np.array(scene.target.position)
-        offset = np.subtract(screen.position, target)[:2]
-        c, s = np.cos(screen.yaw), np.sin(screen.yaw)
-        assert -(c * offset[0] + s * offset[1]) - screen.box.half_extent[0] == pytest.approx(0.0725, abs=0.0076)
-        above = approach_directions(azimuths(target), np.radians([75.0, 80.0, 85.0]))
-        assert not free_directions(target, [screen.box], above, 0.0).any()
+        sides[screen.shape] += 1
+        offset = np.subtract(screen.position, scene.target.position)[:2]
+        pane = offset + (screen.box.half_extent[0] - 0.006) * np.array([np.cos(screen.yaw), np.sin(screen.yaw)])
+        assert np.linalg.norm(pane) < 0.13
+        to_arm = np.radians(225.0) + np.arctan2(scene.target.position[1], scene.target.position[0])
+        in_front = offset @ [np.cos(to_arm), np.sin(to_arm)] > 0.0
+        assert in_front == (screen.shape == "low")
+    assert min(sides.values()) >= 12
 
 
-def test_no_single_way_is_free_in_most_scenes_with_screens():
-    free = []
+def test_no_single_way_is_free_in_front_of_a_high_and_behind_a_low_screen():
+    free = {"low": [], "high": []}
     for scene in scenes("screen", 80):
         target = np.array(scene.target.position)
         ways = approach_directions(azimuths(target), np.radians(np.linspace(40.0, 85.0, 10)))
-        free.append(free_directions(target, [obstacle.box for obstacle in scene.obstacles], ways, 0.0))
-    assert np.mean(free, axis=0).max() < 0.7
-    assert np.any(free, axis=1).all()
+        (screen,) = scene.obstacles
+        free[screen.shape].append(free_directions(target, [screen.box], ways, 0.0))
+    share_low, share_high = np.mean(free["low"], axis=0), np.mean(free["high"], axis=0)
+    assert np.minimum(share_low, share_high).max() < 0.2
+    assert all(np.any(mask) for masks in free.values() for mask in masks)
 
 
 @pytest.mark.parametrize("name", ["clear", "opaque", "translucent", "mirror", "line_of_sight"])
