@@ -20,6 +20,7 @@ import numpy as np
 
 from fixation_gym.geometry.rigid import cross
 from fixation_gym.geometry.twist import crosses, skews
+from fixation_gym.perception.inverse_depth import MIN_DEPTH_M, MIN_INVERSE_DEPTH
 from fixation_gym.types import FloatArray
 
 
@@ -285,10 +286,6 @@ def distance_at(state: CalibratingState, sighting: Sighting) -> Distance:
     return Distance(max(float(q[2]), MIN_DEPTH_M), stds[0], max(lens_depth, MIN_DEPTH_M), stds[1])
 
 
-MIN_INVERSE_DEPTH = 1e-3
-"""Targets farther than 1 km are put there, 1/m."""
-MIN_DEPTH_M = 0.01
-"""Targets nearer than this, or behind the camera, are reported at this depth, m."""
 _KNOWN_RELATIVE_STD = 0.3
 """A distance that is stated less surely than this is no prior for a new start."""
 _EXACT = 1e-9

@@ -4,8 +4,7 @@ The state (alpha, beta, rho) is the object seen from an anchor camera: the point
 base frame (inverse depth after Civera, Davison & Montiel 2008). Poses enter as they are: differentiating them into
 velocities, as a filter on twist and flow must, would waste most of their information.
 
-Everything is value in, value out: ``initialise``, ``predict``, ``update``, ``distance_at``. The algebra of three
-numbers is written in scalars: a NumPy call costs as much as twenty of them.
+Everything is value in, value out: ``initialise``, ``predict``, ``update``, ``distance_at``.
 """
 
 from __future__ import annotations
@@ -15,10 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fixation_gym.perception.inverse_depth import MIN_DEPTH_M, correction, product, projection, view_rows
 from fixation_gym.types import FloatArray
 
-_Vector = tuple[float, float, float]
-_Rows = list[list[float]]
+_REFERENCE_FOCAL_PX = 308.0
+_IDENTITY = np.eye(3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,12 +154,12 @@ def update(
         image_std: standard deviation of the object's pixels about the centroid, normalised coordinates.
         touches_border: whether the object is cut by the image border.
     """
-    view = _view(state, T_base_cam)
+    view = view_rows(state.T_base_anchor, T_base_cam)
     prior = tuple(state.mean.tolist())
     seen = (float(centroid[0]), float(centroid[1]))
     noise = _ray_std(settings, image_std, touches_border) ** 2 + (prior[2] * settings.position_std_m) ** 2
     cov = state.cov.tolist()
-    mean, nis, gain, jacobian = _gauss_newton_step(view, prior, prior, cov, seen, noise)
+    mean, nis, gain, jacobian = correction(view, prior, prior, cov, seen, noise)
     if nis > settings.gate:
         rejected = state.rejected + 1
         if rejected >= settings.alarm_count:
@@ -168,7 +168,7 @@ def update(
             return restart(centroid, T_base_cam, depth, std, settings, image_std, touches_border)
         return replace(state, nis=nis, rejected=rejected)
     for _ in range(2):
-        mean, _, gain, jacobian = _gauss_newton_step(view, prior, mean, cov, seen, noise)
+        mean, _, gain, jacobian = correction(view, prior, mean, cov, seen, noise)
     gains = np.array(gain)  # (3, 2)
     keep = _IDENTITY - gains @ np.array(jacobian)
     posterior = keep @ state.cov @ keep.T + noise * (gains @ gains.T)  # Joseph form: stays positive
@@ -193,14 +193,14 @@ def distance_at(
     ax, ay, _ = (axis @ anchor[:3, :3]).tolist()
     # Derivative of the depth by (alpha, beta, rho), times rho, against the covariance.
     j = (ax, ay, -float(axis @ ray) / rho)
-    spread = _times(state.cov.tolist(), j)
+    spread = product(state.cov.tolist(), j)
     variance = (j[0] * spread[0] + j[1] * spread[1] + j[2] * spread[2]) / rho**2 + settings.position_std_m**2
     return max(depth, MIN_DEPTH_M), math.sqrt(variance), point
 
 
 def predicted_centroid(state: DistanceState, T_base_cam: FloatArray) -> FloatArray:
     """Normalised image coordinates, shape (2,), where a camera should see the object."""
-    image, _ = _projection(_view(state, T_base_cam), tuple(state.mean.tolist()))
+    image, _ = projection(view_rows(state.T_base_anchor, T_base_cam), tuple(state.mean.tolist()))
     return np.array(image)
 
 
@@ -233,63 +233,6 @@ def fixation_at(
     return Fixation(visible, np.array(centroid), point, depth, std, state.nis, True)
 
 
-def _view(state: DistanceState, T_base_cam: FloatArray) -> _Rows:
-    """Rows (r_x, r_y, r_z, b) of the anchor's rotation and of the baseline to it, as the camera sees them.
-
-    The image of the state is the direction with components r_x alpha + r_y beta + r_z + b rho.
-    """
-    to_cam = T_base_cam[:3, :3].T
-    rows = np.empty((3, 4))
-    rows[:, :3] = to_cam @ state.T_base_anchor[:3, :3]
-    rows[:, 3] = to_cam @ (state.T_base_anchor[:3, 3] - T_base_cam[:3, 3])
-    return rows.tolist()
-
-
-def _projection(view: _Rows, mean: _Vector) -> tuple[tuple[float, float], tuple[_Vector, _Vector]]:
-    """Image (x, y) of the point and the derivatives of x and of y by (alpha, beta, rho)."""
-    alpha, beta, rho = mean
-    (xa, xb, xc, xr), (ya, yb, yc, yr), (za, zb, zc, zr) = view
-    depth = max(za * alpha + zb * beta + zc + zr * rho, 1e-3)
-    x = (xa * alpha + xb * beta + xc + xr * rho) / depth
-    y = (ya * alpha + yb * beta + yc + yr * rho) / depth
-    by_x = ((xa - x * za) / depth, (xb - x * zb) / depth, (xr - x * zr) / depth)
-    by_y = ((ya - y * za) / depth, (yb - y * zb) / depth, (yr - y * zr) / depth)
-    return (x, y), (by_x, by_y)
-
-
-def _gauss_newton_step(
-    view: _Rows, prior: _Vector, mean: _Vector, cov: _Rows, seen: tuple[float, float], noise: float
-) -> tuple[_Vector, float, list[tuple[float, float]], tuple[_Vector, _Vector]]:
-    """Linearise at ``mean`` and correct ``prior``.
-
-    Returns:
-        The corrected mean, the normalised innovation squared, the gain (3 rows of 2) and the jacobian (2 rows of 3).
-    """
-    (x, y), jacobian = _projection(view, mean)
-    jx, jy = jacobian
-    px, py = _times(cov, jx), _times(cov, jy)
-    change = (prior[0] - mean[0], prior[1] - mean[1], prior[2] - mean[2])
-    ex = seen[0] - x - (jx[0] * change[0] + jx[1] * change[1] + jx[2] * change[2])
-    ey = seen[1] - y - (jy[0] * change[0] + jy[1] * change[1] + jy[2] * change[2])
-    sxx = jx[0] * px[0] + jx[1] * px[1] + jx[2] * px[2] + noise
-    sxy = jx[0] * py[0] + jx[1] * py[1] + jx[2] * py[2]
-    syy = jy[0] * py[0] + jy[1] * py[1] + jy[2] * py[2] + noise
-    determinant = sxx * syy - sxy * sxy
-    gain = [((a * syy - b * sxy) / determinant, (b * sxx - a * sxy) / determinant) for a, b in zip(px, py, strict=True)]
-    (ax, ay), (bx, by), (rx, ry) = gain
-    alpha, beta = prior[0] + ax * ex + ay * ey, prior[1] + bx * ex + by * ey
-    rho = max(prior[2] + rx * ex + ry * ey, MIN_INVERSE_DEPTH)
-    nis = (syy * ex * ex - 2.0 * sxy * ex * ey + sxx * ey * ey) / determinant
-    return (alpha, beta, rho), nis, gain, jacobian
-
-
-def _times(matrix: _Rows, vector: _Vector) -> _Vector:
-    """Product of a (3, 3) matrix and a vector."""
-    a, b, c = vector
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
-    return xx * a + xy * b + xz * c, yx * a + yy * b + yz * c, zx * a + zy * b + zz * c
-
-
 def _ray_std(settings: DistanceSettings, image_std: float, touches_border: bool) -> float:
     """Standard deviation of a centroid in normalised coordinates, without the position noise."""
     share = settings.border_std_size if touches_border else settings.centroid_std_size
@@ -312,11 +255,3 @@ def restart(
     cov = fresh.cov.copy()
     cov[2, 2] = min(std * rho**2, settings.initial_relative_std * rho) ** 2
     return DistanceState(fresh.T_base_anchor, np.array([*centroid, rho]), cov)
-
-
-MIN_INVERSE_DEPTH = 1e-3
-"""Objects farther than 1 km are put there, 1/m."""
-MIN_DEPTH_M = 0.01
-"""Objects nearer than this, or behind the camera, are reported at this depth, m."""
-_REFERENCE_FOCAL_PX = 308.0
-_IDENTITY = np.eye(3)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.distance_filters import MIN_DEPTH_M, Fixation
+from fixation_gym.perception.distance_filters import Fixation
+from fixation_gym.perception.inverse_depth import MIN_DEPTH_M
 from fixation_gym.perception.segmentation import Segmentation
 from fixation_gym.perception.upright_body import (
     TANGENTS,
