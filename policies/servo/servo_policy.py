@@ -128,7 +128,7 @@ class ServoPolicy:
     def _advance(
         self, percept: Percept, observation: Observation, T_base_cam: FloatArray, obstacle: ObstacleTerm
     ) -> None:
-        fixation, time = percept.fixation, percept.time
+        fixation, time = percept.fixation, observation.time
         if fixation.visible:
             self._last_seen = time
         unseen = time - self._last_seen
