@@ -83,8 +83,8 @@ class Compare:
     """Decisions of every training run."""
     scenario: str = "mixed"
     """Scenario to train on."""
-    test: str = "mixed"
-    """Scenarios to test on, separated by commas; the servo is tested, too."""
+    test: str = ""
+    """Scenarios to test on, separated by commas; if none, the one that is trained on. The servo is tested, too."""
     episodes: int = 50
     """Episodes per test scenario and agent; the same for all."""
     quick: bool = False
@@ -119,7 +119,7 @@ class Compare:
             configs=("zfc", "blind") if self.quick else split_names(self.config),
             seeds=2 if self.quick else self.seeds,
             training=replace(training, scenario=self.scenario, workers=self.env_workers),
-            scenarios=split_names(self.test),
+            scenarios=split_names(self.test or self.scenario),
             episodes=8 if self.quick else self.episodes,
             workers=self.workers,
             backend=self.backend,
