@@ -85,12 +85,11 @@ class Agent:
 class ResidualAgent:
     """A learned policy of ``FixationPick-v0``: the servo, and what was learned to add to it."""
 
-    def __init__(self, card: AgentCard, decider: Decider, perception: Perception) -> None:
-        """Use a loaded network, and a perception for the camera's images."""
+    def __init__(self, card: AgentCard, decider: Decider, servo: ServoPolicy) -> None:
+        """Use a loaded network, and the servo that it was trained to help."""
         self.card = card
         self.estimate: Estimate | None = None
-        self._decider, self._perception = decider, perception
-        self._servo = ResidualServo(ServoPolicy(perception))
+        self._decider, self._servo = decider, ResidualServo(servo)
 
     def reset(self, seed: int | None = None) -> None:
         """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
@@ -100,8 +99,7 @@ class ResidualAgent:
 
     def act(self, obs: Mapping[str, Any]) -> Action:
         """Action of shape (7,)."""
-        reading = Observation.from_dict(obs)
-        shown = self._servo.look(self._perception.update(reading), reading)
+        shown = self._servo.look(Observation.from_dict(obs))
         self.estimate = self._servo.servo.estimate
         return self._servo.action(self._decider.act(shown))
 
@@ -125,7 +123,8 @@ def load_agent(path: Path, env: Any) -> Agent | ResidualAgent:
         return Agent(card, decider)
     from fixation_gym.envs.scene import TABLE_HEIGHT
 
-    return ResidualAgent(card, decider, Perception(env.unwrapped.intrinsics, support_height_m=TABLE_HEIGHT))
+    perception = Perception(env.unwrapped.intrinsics, support_height_m=TABLE_HEIGHT)
+    return ResidualAgent(card, decider, ServoPolicy(perception))
 
 
 def _check_observation(path: Path, card: AgentCard, observation: str, residual: bool, space: spaces.Dict) -> None:

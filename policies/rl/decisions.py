@@ -14,7 +14,7 @@ from policies.rl.inputs import Memory, blind_stage, busy, input_space, network_i
 PERIODS = 5
 """Control periods for which an action is held: 5 decisions per second."""
 _TRIGGER_BIAS = 0.8
-"""Taken off the trigger, so that the first random actions seldom grasp: a grasp takes up to 125 control periods."""
+"""Taken off the trigger, so that the first random actions seldom grasp: a grasp takes 100 control periods and more."""
 
 
 class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any], NDArray[np.float32]]):
@@ -23,7 +23,8 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
     ``step`` holds an action for ``PERIODS`` control periods. If it triggers the grasp, it goes on until the manoeuvre
     has ended and the next action counts: steps whose actions are ignored would teach nothing, and with random
     actions they are nearly all. While the tool goes in, the fingers close and lift, no image is rendered: it would be
-    most of the time of a manoeuvre. So in training, and only there, a grasp does not follow a target that is pushed.
+    most of the time of a manoeuvre. So in training, and only there, a grasp does not follow a target that is pushed, or
+    whose body is seen better on the way.
     The memory of the view rests meanwhile, here and in agents.
     Rewards and ``info["reward_terms"]`` are summed; ``info["periods"]`` counts.
     """

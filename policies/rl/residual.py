@@ -11,13 +11,15 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fixation_gym.control import gaze, servo_laws
+from fixation_gym.control.gaze import GazeGains
 from fixation_gym.control.open_loop import Stage
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.zfc_observation import fixation_vector, proprio_vector, zfc_observation_space
 from fixation_gym.geometry.rigid import pose_to_matrix
+from fixation_gym.perception.distance_filters import Fixation
 from fixation_gym.perception.percept import Percept
 from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
-from fixation_gym.types import Command, Observation
+from fixation_gym.types import Command, FloatArray, Observation
 from policies.catalogue import make_policy
 from policies.servo.phases import Phase
 from policies.servo.servo_policy import ServoPolicy
@@ -31,22 +33,33 @@ class ResidualServo:
     """The servo with room for a learner: ``look`` at an observation, then take the ``action`` for a residual."""
 
     def __init__(self, servo: ServoPolicy) -> None:
-        """Use a servo; its perception is not used, since ``look`` is given the percept."""
+        """Use a servo with its perception; a residual of 0 leaves it as it is."""
         self.servo = servo
 
     def reset(self, seed: int | None = None) -> None:
         """Forget the last episode."""
         self.servo.reset(seed)
 
-    def look(self, percept: Percept, reading: Observation) -> dict[str, NDArray[Any]]:
-        """Let the servo decide; returns what ``FixationPickZFC-v0`` would show."""
-        self._percept, self._command = percept, self.servo.command(percept, reading)
+    def look(self, reading: Observation, looking: bool = True) -> dict[str, NDArray[Any]]:
+        """Let the servo respond; returns what ``FixationPickZFC-v0`` would show.
+
+        Args:
+            reading: the observation of ``FixationPick-v0``.
+            looking: whether its image is new.
+        """
+        self._command = self.servo.respond(reading, looking)
+        self._T_base_cam = pose_to_matrix(reading.camera_pose)
         stage = _STAGES.get(self.phase)
         return {
-            "zfc_map": percept.zfc.cells[None].copy(),
-            "fixation": fixation_vector(percept.fixation),
-            "proprio": proprio_vector(reading, pose_to_matrix(reading.camera_pose), stage),
+            "zfc_map": self._percept.zfc.cells[None].copy(),
+            "fixation": fixation_vector(self._percept.fixation),
+            "proprio": proprio_vector(reading, self._T_base_cam, stage),
         }
+
+    @property
+    def _percept(self) -> Percept:
+        assert self.servo.percept is not None
+        return self.servo.percept
 
     @property
     def phase(self) -> str:
@@ -58,7 +71,8 @@ class ResidualServo:
         """Action of ``FixationPick-v0``, shape (7,), for a residual of shape (2,) in [-1, 1]."""
         command = self._command
         if self.phase != Phase.SEARCH.value and self.phase not in _STAGES:
-            command = _with_lateral(command, residual, self._percept)
+            gains = self.servo.gains.gaze
+            command = _with_lateral(command, residual, self._percept.fixation, self._T_base_cam, gains)
         return np.array([*command.camera_twist / TWIST_LIMITS, command.gripper], np.float32)
 
 
@@ -90,12 +104,18 @@ class ResidualEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
         return self._look(obs), float(reward), terminated, truncated, info
 
     def _look(self, obs: Mapping[str, Any]) -> dict[str, Any]:
-        return self._servo.look(self._base.perceive(), Observation.from_dict(obs))
+        return self._servo.look(Observation.from_dict(obs), self._base.camera_on)
 
 
-def _with_lateral(command: Command, residual: NDArray[np.float32], percept: Percept) -> Command:
-    """Add to v_X and v_Y, with the rotation that keeps the gaze where it is; slowed down to what the camera may do."""
-    v = _SHARE * MAX_LINEAR_SPEED * np.array([*np.clip(residual, -1.0, 1.0), 0.0])
-    rotation = servo_laws.gaze_rotation(np.zeros(2), 0.0, 1.0 / percept.fixation.distance_m, v, 0.0)
-    twist = gaze.within_speed(command.camera_twist + np.array([*v, *rotation, 0.0]))
-    return Command(twist, command.gripper)
+def _with_lateral(
+    command: Command, residual: NDArray[np.float32], fixation: Fixation, T_base_cam: FloatArray, gains: GazeGains
+) -> Command:
+    """Add to v_X and v_Y, within the arm's reach, with the rotation that keeps the gaze where it is.
+
+    The whole is slowed down to what the camera may do.
+    """
+    before = command.camera_twist[:2]
+    wanted = before + _SHARE * MAX_LINEAR_SPEED * np.clip(residual, -1.0, 1.0)
+    added = np.array([*(gaze.within_reach(wanted, T_base_cam, fixation.point_base, gains) - before), 0.0])
+    rotation = servo_laws.gaze_rotation(fixation.centroid, 0.0, 1.0 / fixation.distance_m, added, 0.0)
+    return Command(gaze.within_speed(command.camera_twist + np.array([*added, *rotation, 0.0])), command.gripper)

@@ -73,14 +73,24 @@ class ServoPolicy:
 
     def act(self, obs: Mapping[str, Any]) -> Action:
         """Action of ``FixationPick-v0``, shape (7,), for its observation."""
-        observation = Observation.from_dict(obs)
-        self.percept = self._perception.update(observation)
+        command = self.respond(Observation.from_dict(obs))
+        action = np.concatenate([command.camera_twist / TWIST_LIMITS, [command.gripper]])
+        return action.astype(np.float32)
+
+    def respond(self, observation: Observation, looking: bool = True) -> Command:
+        """Command for the next control period.
+
+        Args:
+            observation: of the robot, now.
+            looking: whether its image is new; if not, what was last perceived stands.
+        """
+        if looking or self.percept is None:
+            self.percept = self._perception.update(observation)
         manoeuvring = self._manoeuvre is not None
         command = self.command(self.percept, observation)
         if manoeuvring and self._manoeuvre is None:
             self._perception.reset()  # the target was pushed or dropped, so nothing known about it holds
-        action = np.concatenate([command.camera_twist / TWIST_LIMITS, [command.gripper]])
-        return action.astype(np.float32)
+        return command
 
     def command(self, percept: Percept, observation: Observation) -> Command:
         """Command for the next control period, for a robot loop that updates its own perception."""
@@ -130,7 +140,7 @@ class ServoPolicy:
     ) -> None:
         fixation, time = percept.fixation, observation.time
         if fixation.visible:
-            self._last_seen = time
+            self._last_seen = percept.time
         unseen = time - self._last_seen
         if self._manoeuvre is not None:
             width = observation.gripper_width
