@@ -158,7 +158,7 @@ OBSTACLE_SHAPES: dict[str, tuple[Shape, ...]] = {
     "screen": (_glass_screen("high", 0.130, 0.120), _glass_screen("low", 0.130, 0.060)),
 }
 OBSTACLE_KINDS = tuple(kind for kind in OBSTACLE_SHAPES if kind != "screen")
-"""Kinds that may stand anywhere; a screen stands close behind the target only."""
+"""Kinds that may stand anywhere; a screen stands close to the target, alone."""
 MAX_OBSTACLES = 4
 
 

@@ -32,7 +32,8 @@ _PUSHED_REGION = ((0.46, 0.66), (-0.18, 0.18))
 """Ranges of x and y in which a push may leave it, in base, m."""
 _CLEARANCE = 0.015
 _LEAST_FREE = 0.2
-"""Least share of the reachable directions that must be free with ``_CLEARANCE`` m to spare."""
+"""Least share of the reachable directions that must be free with ``_CLEARANCE`` m to spare; with a screen, of those of
+the kind that it does not bar, with nothing to spare."""
 _CLIMBS = np.radians([0.0, 5.0, 10.0, 15.0])
 """Rises of the hand on its way, as servo policies climb, along all of which the straight approach must be hindered."""
 _LOW, _STEEP = np.radians([45.0, 50.0, 55.0]), np.radians([75.0, 79.0, 83.0])
@@ -74,11 +75,14 @@ def _propose(scenario: Scenario, screen: str | None, rng: np.random.Generator) -
         if not _told_apart(target, distractor, camera, gaze):
             return None
     obstacles = _sample_obstacles(scenario, target, distractor, camera, screen, rng)
-    if obstacles is None or not (screen or _is_solvable(target, distractor, obstacles)):
+    if obstacles is None:
+        return None
+    boxes = _boxes(obstacles, distractor)
+    if not (_decides(target, boxes, screen) if screen else _is_solvable(target, boxes)):
         return None
     if obstacles and not _has_start_room(obstacles, camera, gaze):
         return None
-    if obstacles and not (_decides(target, obstacles, screen) if screen else _hinders(target, obstacles, camera)):
+    if obstacles and not (screen or _hinders(target, obstacles, camera)):
         return None
     light = rng.uniform(-0.5, 0.5, 2)
     return SceneSpec(
@@ -95,11 +99,14 @@ def _propose(scenario: Scenario, screen: str | None, rng: np.random.Generator) -
 # -- what a scene must be ------------------------------------------------------------------------------------------
 
 
-def _is_solvable(target: TargetSpec, distractor: TargetSpec | None, obstacles: tuple[ObstacleSpec, ...]) -> bool:
-    """Whether enough directions are free, wherever the target is, of all places where an obstacle ever is."""
+def _boxes(obstacles: tuple[ObstacleSpec, ...], distractor: TargetSpec | None) -> list[Box]:
+    """Boxes around all that may be hit, at all places where it ever is."""
     boxes = [box for obstacle in obstacles for box in obstacle.boxes]
-    if distractor is not None:
-        boxes.append(distractor.box)
+    return boxes if distractor is None else [*boxes, distractor.box]
+
+
+def _is_solvable(target: TargetSpec, boxes: list[Box]) -> bool:
+    """Whether enough directions are free, wherever the target is."""
     ends = target.places[[0, -1]] if target.motion else target.places[:1]
     return all(free_directions(end, boxes, reachable_directions(end), _CLEARANCE).mean() >= _LEAST_FREE for end in ends)
 
@@ -117,9 +124,8 @@ def _hinders(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...], camera: Fl
     return not free_directions(centre, boxes, ways, 0.0).any()
 
 
-def _decides(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...], screen: str) -> bool:
+def _decides(target: TargetSpec, boxes: list[Box], screen: str) -> bool:
     """Whether a low screen bars all low ways and leaves some from above, or a high one the other way round."""
-    boxes = [box for obstacle in obstacles for box in obstacle.boxes]
     bearing = math.atan2(target.position[1], target.position[0])
     barred, left = (_LOW, _STEEP) if screen == "low" else (_STEEP, _LOW)
     for place in target.places[[0, -1]]:
