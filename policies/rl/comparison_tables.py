@@ -93,26 +93,26 @@ def differences_of(results: Sequence[dict[str, Any]], reference: str) -> list[di
 
 def format_differences(rows: Sequence[dict[str, Any]]) -> str:
     """The differences for people, in percentage points with their intervals."""
-    lines = []
-    for row in rows:
-        cells = "".join(
-            f"{100 * row[measure]:+11.0f} [{100 * row[measure + '_low']:+4.0f}, {100 * row[measure + '_high']:+4.0f}]"
-            for measure in MEASURES
-        )
-        lines.append(f"{row['config'] + ' - ' + row['minus']:18}{row['scenario']:12}{row['seeds']:6}{cells}")
-    return "\n".join(lines)
+    return "\n".join(
+        f"{row['config'] + ' - ' + row['minus']:18}{row['scenario']:12}{row['seeds']:6}{_percent(row, '+')}"
+        for row in rows
+    )
 
 
 def format_table(rows: Sequence[dict[str, Any]]) -> str:
     """The table for people: rates in percent with their intervals."""
-    lines = [f"{'':12}{'scenario':18}{'seeds':>6}{'success':>22}{'without collision':>22}"]
-    for row in rows:
-        cells = "".join(
-            f"{100 * row[measure]:11.0f} [{100 * row[measure + '_low']:3.0f}, {100 * row[measure + '_high']:3.0f}]"
-            for measure in MEASURES
-        )
-        lines.append(f"{row['config']:12}{row['scenario']:18}{row['seeds']:6}{cells}")
+    lines = [f"{'':12}{'scenario':18}{'seeds':>6}{'success':>23}{'without collision':>23}"]
+    lines += [f"{row['config']:12}{row['scenario']:18}{row['seeds']:6}{_percent(row)}" for row in rows]
     return "\n".join(lines)
+
+
+def _percent(row: dict[str, Any], sign: str = "") -> str:
+    """Both measures of a row with their intervals, in percent."""
+    cells = ""
+    for measure in MEASURES:
+        value, low, high = (100.0 * row[measure + end] for end in ("", "_low", "_high"))
+        cells += f"{value:{sign}11.0f} [{low:{sign}4.0f}, {high:{sign}4.0f}]"
+    return cells
 
 
 def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
