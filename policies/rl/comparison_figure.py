@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from fixation_gym.evaluation.video import write_file
 
-_AXES = (("env_steps", "control steps"), ("wall_min", "training, minutes"))
+_AXES = (("env_steps", 1e-3, "control steps, thousands"), ("wall_min", 1.0, "training, minutes"))
 _ROWS = (("success", "success"), ("collision_free", "success without collision"))
 _SERVO = "servo"
 
@@ -26,11 +26,11 @@ def draw_comparison(summary: dict[str, Any], path: Path) -> None:
     scenario = summary["training"]["scenario"]
     servo = [row for row in summary["table"] if row["config"] == _SERVO and row["scenario"] == scenario]
     for row, (measure, title) in enumerate(_ROWS):
-        for column, (key, label) in enumerate(_AXES):
+        for column, (key, unit, label) in enumerate(_AXES):
             ax = axes[row, column]
             for number, config in enumerate(summary["configs"]):
                 points = [point for point in summary["curves"] if point["config"] == config]
-                x = [point[key] for point in points]
+                x = [unit * point[key] for point in points]
                 ax.plot(x, [point[measure] for point in points], color=f"C{number}", marker=".", label=config)
                 low, high = ([point[f"{measure}_{end}"] for point in points] for end in ("low", "high"))
                 ax.fill_between(x, low, high, color=f"C{number}", alpha=0.2, linewidth=0)
