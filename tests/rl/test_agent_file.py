@@ -5,12 +5,14 @@ import json
 import os
 import zipfile
 from dataclasses import asdict
+from pathlib import Path
 
 import pytest
 import torch
 
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
+from policies import agents
 from policies.catalogue import surroundings
 from policies.rl.agent_file import AgentCard, read_agent, read_card, write_agent
 
@@ -123,3 +125,17 @@ def test_weights_cannot_execute_anything(agent, monkeypatch):
     with pytest.raises(UsageError, match="damaged"):
         read_agent(agent)
     assert not (agent.parent / "executed").exists()
+
+
+SHIPPED = sorted(Path(agents.__file__).parent.glob("*.zip"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_an_agent_that_comes_with_the_package_is_small_and_described_by_its_card(path):
+    card, weights = read_agent(path)
+    assert weights
+    assert path.stem.startswith(card.config)
+    assert path.stat().st_size < 2_000_000
+    about = path.with_name("README.md").read_text()
+    (line,) = (line for line in about.splitlines() if line.startswith(f"| `{path.name}` |"))
+    assert f"`{card.scenario}`, seed {card.seed}, {card.decisions} decisions" in line
