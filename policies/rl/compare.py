@@ -32,7 +32,7 @@ RUNS_FOLDER = "runs"
 CELLS_FILE = "cells.jsonl"
 SERVO = "servo"
 TEST_SEED = 5
-"""``--seed`` of the tests: no scene of that block was looked at while anything was developed."""
+"""``--seed`` of the tests: a block of its own, that nothing is tuned on."""
 
 CellKey = tuple[str, int]
 """(configuration, seed)"""
