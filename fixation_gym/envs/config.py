@@ -60,6 +60,9 @@ class Scenario:
     screen: bool = False
     """Whether the one obstacle is a glass screen close to the target: in half of the scenes a low one in front of it,
     which bars low ways, in the others a high one behind it, which bars ways from above."""
+    coloured_frames: bool = False
+    """Whether frames and rims are of colours drawn anew for each obstacle, instead of one dark grey. Nothing else of a
+    scene differs."""
 
     def __post_init__(self) -> None:
         _require_names("obstacle_kinds", self.obstacle_kinds, OBSTACLE_KINDS)
@@ -75,8 +78,9 @@ class Scenario:
         _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
         _require_probability("target_moves", self.target_moves)
         _require_probability("distractor", self.distractor)
-        if not isinstance(self.screen, bool):
-            raise ValueError(f"screen must be true or false, got {self.screen!r}")
+        for name in ("screen", "coloured_frames"):
+            if not isinstance(getattr(self, name), bool):
+                raise ValueError(f"{name} must be true or false, got {getattr(self, name)!r}")
         if self.screen and self.obstacle_count != (0, 0):
             raise ValueError(f"screen stands alone: obstacle_count must be (0, 0), got {self.obstacle_count}")
         high = self.obstacle_count[1]
@@ -132,6 +136,7 @@ SCENARIOS: dict[str, Scenario] = {
             distractor=0.3,
         ),
         Scenario("screen", screen=True),
+        Scenario("screen_coloured", screen=True, coloured_frames=True),
     )
 }
 SCENARIO_NAMES = tuple(SCENARIOS)

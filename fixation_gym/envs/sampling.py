@@ -6,6 +6,7 @@ as if the others were not there.
 
 from __future__ import annotations
 
+import colorsys
 import math
 from dataclasses import replace
 
@@ -40,6 +41,8 @@ _LOW, _STEEP = np.radians([45.0, 50.0, 55.0]), np.radians([75.0, 79.0, 83.0])
 """Elevations of low ways and of those from above: a screen must bar all of one kind and leave some of the other."""
 _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
+_FRAME_HUES = (1.0 / 8.0, 7.0 / 8.0)
+"""Range of the hue of coloured frames, 0..1: anything but the target's red."""
 _START_ROOM = 0.10
 """Least distance between the point between the finger tips and obstacles at the start, m; half the hand is 5 cm."""
 _ATTEMPTS = 1000
@@ -85,7 +88,7 @@ def _propose(scenario: Scenario, screen: str | None, rng: np.random.Generator) -
     if obstacles and not (screen or _hinders(target, obstacles, camera)):
         return None
     light = rng.uniform(-0.5, 0.5, 2)
-    return SceneSpec(
+    scene = SceneSpec(
         target=target,
         obstacles=obstacles,
         camera_position=_vector(camera),
@@ -94,6 +97,8 @@ def _propose(scenario: Scenario, screen: str | None, rng: np.random.Generator) -
         table_texture=str(rng.choice(("table_wood", "table_plank", "table_felt"))),
         distractor=distractor,
     )
+    # Drawn last, so that the scene of a seed is otherwise the same with frames of any colour.
+    return _with_coloured_frames(scene, rng) if scenario.coloured_frames else scene
 
 
 # -- what a scene must be ------------------------------------------------------------------------------------------
@@ -241,6 +246,14 @@ def _sample_obstacles(
             return None
         obstacles.append(obstacle)
     return tuple(obstacles)
+
+
+def _with_coloured_frames(scene: SceneSpec, rng: np.random.Generator) -> SceneSpec:
+    obstacles = []
+    for obstacle in scene.obstacles:
+        red, green, blue = colorsys.hsv_to_rgb(rng.uniform(*_FRAME_HUES), rng.uniform(0.0, 1.0), rng.uniform(0.1, 1.0))
+        obstacles.append(replace(obstacle, frame_rgba=(red, green, blue, 1.0)))
+    return replace(scene, obstacles=tuple(obstacles))
 
 
 def _vector(values: FloatArray) -> Vector:

@@ -16,6 +16,8 @@ TABLE_HEIGHT = -0.112
 """Height of the table top in the robot base frame, m."""
 TARGET_REGION = ((0.50, 0.62), (-0.14, 0.14))
 """Ranges of x and y in which the target is placed, in base, m."""
+DARK_FRAME = (0.16, 0.17, 0.20, 1.0)
+"""Usual colour of frames and rims."""
 APPROACH_AZIMUTHS = np.radians(np.linspace(15.0, 75.0, 5))
 APPROACH_ELEVATIONS = np.radians(np.linspace(45.0, 83.0, 5))
 """Directions, relative to the bearing of the target, from which the arm can reach it; one must be free of obstacles."""
@@ -56,6 +58,7 @@ class ObstacleSpec:
     texture: str
     has_label: bool
     motion: Motion | None = None
+    frame_rgba: tuple[float, float, float, float] = DARK_FRAME
 
     @property
     def box(self) -> Box:

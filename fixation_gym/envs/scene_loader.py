@@ -19,7 +19,7 @@ from fixation_gym.types import FloatArray
 
 TARGET_RGBA = (0.80, 0.06, 0.05, 1.0)
 _LABEL_RGBA = (0.85, 0.85, 0.25, 1.0)
-_RIM_RGBA = (0.16, 0.17, 0.20, 1.0)
+_UNTINTED = (1.0, 1.0, 1.0, 1.0)
 
 
 _WRITTEN_FIELDS = (
@@ -141,7 +141,7 @@ class SceneLoader:
                 continue
             textured = finish == "solid"
             model.geom_matid[entry.geom] = self._materials[obstacle.texture] if textured else -1
-            colours = {"glass": obstacle.rgba, "rim": _RIM_RGBA, "label": _LABEL_RGBA, "solid": (1.0, 1.0, 1.0, 1.0)}
+            colours = {"glass": obstacle.rgba, "rim": obstacle.frame_rgba, "label": _LABEL_RGBA, "solid": _UNTINTED}
             model.geom_rgba[entry.geom] = colours[finish]
             if finish == "label" and not obstacle.has_label:
                 model.geom_group[entry.geom] = HIDDEN_GROUP

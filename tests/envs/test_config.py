@@ -21,6 +21,7 @@ def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
         ({"obstacle_count": [0, 9], "obstacle_kinds": ["opaque"]}, "within 0..4"),
         ({"obstacle_count": [1, 1]}, "obstacle_kinds"),
         ({"screen": 0.5}, "true or false"),
+        ({"coloured_frames": "red"}, "true or false"),
         ({"base": "opaque", "screen": True}, r"obstacle_count must be \(0, 0\)"),
         ({"target_shapes": ["teapot"]}, "duck"),
         ({"target_shapes": 3}, "list of names"),

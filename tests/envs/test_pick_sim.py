@@ -98,6 +98,20 @@ def test_the_fast_view_shows_what_the_view_in_full_quality_shows(scenario):
     env.close()
 
 
+def test_a_coloured_frame_is_drawn_in_its_colour_and_all_else_as_before():
+    images = []
+    for scenario in ("screen", "screen_coloured"):
+        env = gym.make("FixationPick-v0", scenario=scenario, sensor_noise="ideal", image_size=(120, 160)).unwrapped
+        obs, _ = env.reset(seed=1)
+        images.append(obs["rgb"].astype(np.float32))
+        frame = np.array(env.scene.obstacles[0].frame_rgba[:3])
+        env.close()
+    other = np.abs(images[1] - images[0]).max(axis=-1) > 0
+    assert 0.02 < other.mean() < 0.4
+    seen = np.median(images[1][other], axis=0)
+    np.testing.assert_allclose(seen / seen.sum(), frame / frame.sum(), atol=0.1)
+
+
 def test_without_an_image_size_the_rest_of_the_observation_is_the_same():
     envs = [gym.make("FixationPick-v0", image_size=size, sensor_noise="ideal") for size in (None, (48, 64))]
     for env in envs:

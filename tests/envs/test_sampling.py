@@ -1,7 +1,8 @@
 """What every sampled scene promises."""
 
+import colorsys
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,22 @@ def test_a_screen_stands_alone_close_to_the_target_low_in_front_or_high_behind()
         in_front = offset @ [np.cos(to_arm), np.sin(to_arm)] > 0.0
         assert in_front == (screen.shape == "low")
     assert min(sides.values()) >= 12
+
+
+def test_coloured_frames_change_nothing_else_and_are_never_red():
+    colours = []
+    for seed in range(40):
+        plain, coloured = (
+            sample_scene(SCENARIOS[name], np.random.default_rng(seed)) for name in ("screen", "screen_coloured")
+        )
+        assert replace(coloured, obstacles=plain.obstacles) == plain
+        for dark, bright in zip(plain.obstacles, coloured.obstacles, strict=True):
+            assert replace(bright, frame_rgba=dark.frame_rgba) == dark
+            colours.append(bright.frame_rgba[:3])
+    hues, _, values = np.array([colorsys.rgb_to_hsv(*colour) for colour in colours]).T
+    assert np.all((hues > 0.12) & (hues < 0.88) | (np.ptp(colours, axis=1) == 0.0))
+    assert values.min() < 0.3
+    assert values.max() > 0.8
 
 
 def test_no_single_way_is_free_in_front_of_a_high_and_behind_a_low_screen():
