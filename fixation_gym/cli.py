@@ -6,6 +6,7 @@ Heavy modules are imported in ``run``, so that help and errors come at once.
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import json
 import sys
@@ -20,6 +21,9 @@ from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train
 from fixation_gym.report_commands import Ablate, Report, print_different, split_names
+
+_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
+"""What a disk that is full or broken says."""
 
 
 class Command(Protocol):
@@ -289,6 +293,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return parse(argv).run()
     except (UsageError, MissingGLError) as error:
         print(f"fixation-gym: error: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        if error.errno not in _DISK_ERRORS:
+            raise
+        advice = "what was finished is kept: make room, and give the same command again"
+        print(f"fixation-gym: error: cannot write ({error.strerror}); {advice}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("fixation-gym: interrupted; what was finished is kept", file=sys.stderr)

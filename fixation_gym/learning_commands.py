@@ -88,8 +88,8 @@ class Compare:
     episodes: int = 50
     """Episodes per test scenario and agent; the same for all."""
     quick: bool = False
-    """Two seeds of zfc and blind, 600 decisions each, 8 episodes, whatever the options above say: minutes, to see
-    that everything works."""
+    """Two seeds of zfc and blind, 600 decisions each, 8 episodes, whatever --config, --seeds, --steps and --episodes
+    say: minutes, to see that everything works."""
     env_workers: int = 4
     """Processes that step the environments of one training run."""
     workers: int = 1

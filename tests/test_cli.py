@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +183,22 @@ def test_doctor_says_by_its_exit_code_whether_all_is_well(
     assert cli.main(["doctor", "--out", str(tmp_path)]) == code
     assert json.loads(capsys.readouterr().out) == diagnosis
     assert json.loads((tmp_path / "summary.json").read_text()) == diagnosis
+
+
+def test_a_full_disk_ends_any_command_in_one_line_and_other_system_errors_are_not_hidden(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(number: int) -> dict[str, Any]:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(doctor, "diagnose", lambda: fail(errno.ENOSPC))
+    assert cli.main(["doctor"]) == 2
+    error = capsys.readouterr().err
+    assert "cannot write (No space left on device); what was finished is kept" in error
+    assert len(error.splitlines()) == 1
+    monkeypatch.setattr(doctor, "diagnose", lambda: fail(errno.EAGAIN))
+    with pytest.raises(BlockingIOError):
+        cli.main(["doctor"])
 
 
 def test_an_interrupted_command_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

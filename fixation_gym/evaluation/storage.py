@@ -205,13 +205,12 @@ class EpisodeStore(ResultStore[EpisodeKey, EpisodeResult]):
         super().append(replace(result, trace=None))
 
 
-def _check_run(results: Path, run: Mapping[str, Any]) -> None:
-    folder = results.parent
-    path = folder / RUN_FILE
-    if not path.exists():
-        if results.exists() and results.stat().st_size > 0:
-            raise UsageError(f"{folder} has {results.name} but no {RUN_FILE}; choose another --out")
-        return
+def check_same_run(path: Path, run: Mapping[str, Any]) -> None:
+    """Check that the run that a file describes is this one.
+
+    Raises:
+        UsageError: if the file cannot be read, or naming what differs.
+    """
     try:
         stored = dict(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError) as error:
@@ -220,4 +219,12 @@ def _check_run(results: Path, run: Mapping[str, Any]) -> None:
     differing = [key for key in {**stored, **wanted} if stored.get(key) != wanted.get(key)]
     if differing:
         differences = ", ".join(f"{key} {stored.get(key)} instead of {wanted.get(key)}" for key in differing)
-        raise UsageError(f"{folder} holds another run, with {differences}; choose another --out")
+        raise UsageError(f"{path.parent} holds another run, with {differences}; choose another --out")
+
+
+def _check_run(results: Path, run: Mapping[str, Any]) -> None:
+    path = results.with_name(RUN_FILE)
+    if path.exists():
+        check_same_run(path, run)
+    elif results.exists() and results.stat().st_size > 0:
+        raise UsageError(f"{path.parent} has {results.name} but no {RUN_FILE}; choose another --out")

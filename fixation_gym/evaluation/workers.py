@@ -128,13 +128,37 @@ def run_cells(
                 "kept, and the same command goes on"
             ) from error
         return
+    from ray.exceptions import RayError  # pyright: ignore[reportMissingImports]
     from ray.util.joblib import register_ray  # pyright: ignore[reportMissingImports]
 
+    _join_cluster(workers)
     register_ray()
     batch = 4 * workers  # joblib's Ray backend only returns whole lists; smaller ones lose less when killed
-    for start in range(0, len(cells), batch):
-        parallel = joblib.Parallel(n_jobs=workers, backend="ray")
-        yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells[start : start + batch]))
+    try:
+        for start in range(0, len(cells), batch):
+            parallel = joblib.Parallel(n_jobs=workers, backend="ray")
+            yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells[start : start + batch]))
+    except RayError as error:
+        raise UsageError(
+            f"a Ray worker died ({type(error).__name__}); what is finished is kept, and the same command goes on"
+        ) from error
+
+
+def _join_cluster(workers: int) -> None:
+    """Join the Ray cluster of RAY_ADDRESS. Without one, joblib's backend starts one on this machine.
+
+    Raises:
+        UsageError: if it cannot be reached or has fewer CPUs than ``workers``.
+    """
+    import ray  # pyright: ignore[reportMissingImports]
+
+    if not ray.is_initialized() and "RAY_ADDRESS" in os.environ:
+        try:
+            ray.init()
+        except ConnectionError as error:
+            raise UsageError(f"no Ray cluster at RAY_ADDRESS={os.environ['RAY_ADDRESS']}: start one there") from error
+    if ray.is_initialized() and workers > (cpus := int(ray.cluster_resources().get("CPU", 0))):
+        raise UsageError(f"--workers must be at most {cpus}, the CPUs of the Ray cluster, got {workers}")
 
 
 def _results(values: Any) -> Iterable[dict[str, Any]]:

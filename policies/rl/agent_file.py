@@ -100,6 +100,9 @@ def _read(path: Path) -> tuple[AgentCard, bytes]:
         known = card.config in CONFIGS and card.algorithm in ALGORITHMS
     except (TypeError, KeyError) as error:
         raise _damaged(path) from error
+    numbers = (*card.image_size, card.seed, card.decisions, card.env_steps)
+    if len(card.image_size) != 2 or not all(isinstance(number, int) for number in numbers):
+        raise _damaged(path)
     if card.format != FORMAT or not known:
         raise UsageError(f"{path} is an agent of another version (format {card.format}, here {FORMAT}); train it anew")
     return card, weights

@@ -51,7 +51,7 @@ class Progress:
 
 
 def save_checkpoint(folder: Path, model: BaseAlgorithm, progress: Progress) -> Path:
-    """Add a checkpoint to a run, then remove the ones before it.
+    """Add a checkpoint to a run, then remove all others.
 
     Raises:
         UsageError: if it cannot be written; the ones before it stay.
@@ -72,7 +72,7 @@ def save_checkpoint(folder: Path, model: BaseAlgorithm, progress: Progress) -> P
         kept = _checkpoints(folder)
         last = f"the last one, {kept[-1].name}, is intact" if kept else "there is none yet"
         raise UsageError(f"cannot write a checkpoint to {folder} ({_reason(error)}); {last}") from error
-    for old in _checkpoints(folder):
+    for old in folder.glob(f"{_PREFIX}*"):  # what a kill left unfinished, too
         if old != target:
             shutil.rmtree(old, ignore_errors=True)
     return target

@@ -26,12 +26,13 @@ def draw_comparison(summary: dict[str, Any], path: Path) -> None:
     scenario = summary["training"]["scenario"]
     servo = [row for row in summary["table"] if row["config"] == _SERVO and row["scenario"] == scenario]
     for row, (measure, title) in enumerate(_ROWS):
-        for column, (key, unit, label) in enumerate(_AXES):
+        for column, (key, unit, x_label) in enumerate(_AXES):
             ax = axes[row, column]
             for number, config in enumerate(summary["configs"]):
                 points = [point for point in summary["curves"] if point["config"] == config]
                 x = [unit * point[key] for point in points]
-                ax.plot(x, [point[measure] for point in points], color=f"C{number}", marker=".", label=config)
+                label = f"{config}, {points[0]['seeds']} seeds" if points else config
+                ax.plot(x, [point[measure] for point in points], color=f"C{number}", marker=".", label=label)
                 low, high = ([point[f"{measure}_{end}"] for point in points] for end in ("low", "high"))
                 ax.fill_between(x, low, high, color=f"C{number}", alpha=0.2, linewidth=0)
             for line in servo:
@@ -41,9 +42,9 @@ def draw_comparison(summary: dict[str, Any], path: Path) -> None:
             if column == 0:
                 ax.set_ylabel(title)
             if row == 1:
-                ax.set_xlabel(label)
+                ax.set_xlabel(x_label)
     axes[0, 0].legend(loc="lower right")
-    figure.suptitle(f"Training on {scenario}: interquartile mean of {summary['seeds']} seeds, 95 % bootstrap intervals")
+    figure.suptitle(f"Training on {scenario}: interquartile means over seeds, 95 % bootstrap intervals")
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=120)
     write_file(path, buffer.getvalue())

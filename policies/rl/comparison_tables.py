@@ -71,13 +71,13 @@ def table_of(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 def differences_of(results: Sequence[dict[str, Any]], reference: str) -> list[dict[str, Any]]:
     """One row per other learner and scenario: rates of ``reference`` minus its own, paired by seed.
 
-    Means over the seeds that both have, with intervals of the bootstrap over them.
+    Means over the seeds that both have, with intervals of the bootstrap over them; one seed has no interval, so no row.
     """
     runs = {(result["config"], result["seed"]): result["scenarios"] for result in results if result["curve"]}
     rows = []
     for other in _configs([result for result in results if result["curve"] and result["config"] != reference]):
         seeds = [seed for config, seed in runs if config == other and (reference, seed) in runs]
-        if not seeds:
+        if len(seeds) < 2:
             continue
         for name in runs[reference, seeds[0]]:
             row: dict[str, Any] = {"config": reference, "minus": other, "scenario": name, "seeds": len(seeds)}
@@ -94,7 +94,7 @@ def differences_of(results: Sequence[dict[str, Any]], reference: str) -> list[di
 def format_differences(rows: Sequence[dict[str, Any]]) -> str:
     """The differences for people, in percentage points with their intervals."""
     return "\n".join(
-        f"{row['config'] + ' - ' + row['minus']:18}{row['scenario']:12}{row['seeds']:6}{_percent(row, '+')}"
+        f"{row['config'] + ' - ' + row['minus']:18}{row['scenario']:18}{row['seeds']:6}{_percent(row, '+')}"
         for row in rows
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
@@ -23,6 +23,10 @@ class BusyEnvs(VecEnvWrapper):
     def reset(self) -> VecEnvObs:
         """Reset all environments."""
         return self.venv.reset()
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Nothing: SB3 would seed with the run's seed and its neighbours, ``draw_new_scenes`` decides instead."""
+        return [None] * self.num_envs
 
     def step_wait(self) -> VecEnvStepReturn:
         """Do something else, then wait for the environments."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +17,7 @@ from tqdm import tqdm
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, folder_lock, make_folder, write_json
+from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, check_same_run, folder_lock, make_folder, write_json
 from policies.rl.agent_file import AgentCard, write_agent
 from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
 from policies.rl.config import TrainConfig
@@ -51,6 +50,8 @@ def train(config: TrainConfig, out: Path, resume: bool = False) -> dict[str, Any
     with folder_lock(out), _writing(out):
         checkpoint = _check_folder(config, out, resume)
         progress = Progress() if checkpoint is None else read_progress(checkpoint)
+        if progress.decisions > config.steps and not progress.curve:
+            raise UsageError(f"{out} already has {progress.decisions} decisions; --steps must not be less")
         write_json(out / RUN_FILE, config.identity())
         with worker_deaths(lambda: _advice(out)):
             if progress.decisions < config.steps:
@@ -180,18 +181,12 @@ def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
     """
     path, checkpoint = out / RUN_FILE, latest_checkpoint(out)
     if not path.exists():
+        if checkpoint is not None:
+            raise UsageError(f"{out} has {checkpoint.name} but no {RUN_FILE}; choose another --out")
         if resume:
             raise UsageError(f"{out} holds no training run to resume; leave out --resume to start one")
         return None
-    try:
-        stored = dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError) as error:
-        raise UsageError(f"{path} cannot be read ({error}); choose another --out") from error
-    wanted = json.loads(json.dumps(config.identity()))
-    differing = [key for key in {**stored, **wanted} if stored.get(key) != wanted.get(key)]
-    if differing:
-        differences = ", ".join(f"{key} {stored.get(key)} instead of {wanted.get(key)}" for key in differing)
-        raise UsageError(f"{out} holds another run, with {differences}; choose another --out")
+    check_same_run(path, config.identity())
     if not resume:
         raise UsageError(f"{out} holds a training run; add --resume to go on with it, or choose another --out")
     return checkpoint
@@ -210,4 +205,4 @@ def _advice(out: Path) -> str:
     checkpoint = latest_checkpoint(out)
     if checkpoint is None:
         return "there is no checkpoint yet"
-    return f"--resume goes on from {checkpoint.name}"
+    return f"`train --resume`, or the same `compare` again, goes on from {checkpoint.name}"

@@ -86,6 +86,10 @@ def damage_names(path):
     rewrite(path, **{"agent.json": json.dumps({**asdict(CARD), "config": ["zfc"]})})
 
 
+def damage_size(path):
+    rewrite(path, **{"agent.json": json.dumps({**asdict(CARD), "image_size": ["96", "128"]})})
+
+
 def damage_card(path):
     rewrite(path, **{"agent.json": '{"config": "zfc"}'})
 
@@ -100,6 +104,7 @@ def damage_card(path):
         (damage_other_version, "agent of another version"),
         (damage_card, "is damaged or no agent"),
         (damage_names, "is damaged or no agent"),
+        (damage_size, "is damaged or no agent"),
         (damage_flipped, "is damaged or no agent"),
     ],
 )

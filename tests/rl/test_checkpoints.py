@@ -3,11 +3,12 @@
 import errno
 import json
 import resource
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rl_fakes import FakeZFC
-from stable_baselines3 import SAC
+from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from fixation_gym.cli import main
@@ -15,12 +16,14 @@ from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.storage import RUN_FILE, write_json
 from policies.rl import train as training
 from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
-from policies.rl.config import TrainConfig
-from policies.rl.decisions import DecisionEnv
-from policies.rl.environments import closing, worker_deaths
-from policies.rl.train import make_model
+from policies.rl.config import TRAIN_SEEDS, TrainConfig
+from policies.rl.decisions import DecisionEnv, FixedEpisodes
+from policies.rl.environments import closing, draw_new_scenes, worker_deaths
+from policies.rl.overlap import BusyEnvs
+from policies.rl.train import agent_weights, make_model
 
 CONFIG = TrainConfig(buffer_size=50)
+PPO_CONFIG = replace(CONFIG, algorithm="ppo")
 
 
 def fake_env():
@@ -54,8 +57,38 @@ def test_a_checkpoint_holds_model_buffer_and_progress(tmp_path, model):
     assert again.replay_buffer.rewards.any()
 
 
+def test_ppo_learns_and_its_checkpoint_acts_as_it_does(tmp_path):
+    envs = DummyVecEnv([fake_env, fake_env])
+    model = make_model(PPO_CONFIG, envs, None)
+    before = {name: weights.clone() for name, weights in agent_weights(model).items()}
+    model.learn(1024)
+    assert all((weights != before[name]).any() for name, weights in agent_weights(model).items())
+    again = load_model(save(tmp_path, model, 1024), PPO, env=envs)
+    inputs = envs.reset()
+    np.testing.assert_array_equal(
+        again.predict(inputs, deterministic=True)[0], model.predict(inputs, deterministic=True)[0]
+    )
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+def test_scenes_of_training_are_those_of_training_alone(tmp_path, resumed):
+    # SB3 seeds environments with the run's seed, 0, 1, ..: scenes of `evaluate`, and of other runs.
+    envs = DummyVecEnv([lambda: FixedEpisodes(fake_env(), [5]), lambda: FixedEpisodes(fake_env(), [5])])
+    busy = BusyEnvs(envs)
+    model = make_model(CONFIG, busy, None)
+    if resumed:
+        model = load_model(save(tmp_path, model, 0), SAC, env=busy)
+    draw_new_scenes(busy, CONFIG, 0)
+    model.set_env(busy, force_reset=True)
+    model.learn(20)
+    seeds = [seed for env in envs.envs for seed in env.unwrapped.seeds if seed is not None]
+    assert len(seeds) == 2
+    assert min(seeds) >= TRAIN_SEEDS
+
+
 def test_a_newer_checkpoint_replaces_the_older(tmp_path, model):
     save(tmp_path, model, 20)
+    (tmp_path / "checkpoint-0000000030.unfinished").mkdir()
     newer = save(tmp_path, model, 40)
     assert latest_checkpoint(tmp_path) == newer
     assert [path.name for path in tmp_path.iterdir()] == [newer.name]
@@ -90,7 +123,7 @@ def test_a_damaged_checkpoint_is_named(tmp_path, model, file):
 
 
 def train(*options):
-    return main(["train", "--steps", "10", *options])
+    return main(["train", "--steps", "2000", *options])
 
 
 @pytest.mark.parametrize(
@@ -100,6 +133,7 @@ def train(*options):
         (("--algorithm", "dqn"), "choose one of sac, ppo"),
         (("--workers", "0"), "--workers must be at least 1"),
         (("--seed", "-1"), "--seed must be within 0..999"),
+        (("--steps", "1000"), "--steps must be above 1000, after so many random ones SAC learns, got 1000"),
         (("--resume",), "holds no training run to resume"),
     ],
 )
@@ -123,6 +157,21 @@ def test_a_folder_with_a_run_is_not_mixed_with_another(tmp_path, options, messag
     assert train(*options, "--out", str(tmp_path)) == 2
     assert message in capsys.readouterr().err
     assert json.loads((tmp_path / RUN_FILE).read_text()) == before
+
+
+@pytest.mark.parametrize("options", [(), ("--resume",)])
+def test_checkpoints_of_a_run_that_is_not_described_are_left_alone(tmp_path, options, capsys, model):
+    earlier = save(tmp_path, model, 20)
+    assert train(*options, "--out", str(tmp_path)) == 2
+    assert f"has {earlier.name} but no run.json" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [earlier]
+
+
+def test_fewer_steps_than_a_run_has_without_an_evaluation_are_refused(tmp_path, capsys, model):
+    write_json(tmp_path / RUN_FILE, TrainConfig().identity())
+    save_checkpoint(tmp_path, model, Progress(2500))
+    assert train("--resume", "--out", str(tmp_path)) == 2
+    assert "already has 2500 decisions; --steps must not be less" in capsys.readouterr().err
 
 
 def test_a_disk_that_fills_up_is_reported_in_one_line_with_what_is_left(tmp_path, monkeypatch, capsys):

@@ -110,6 +110,17 @@ def test_a_backend_finds_what_this_process_finds(tmp_path, backend, request):
         assert there[part] == here[part]
 
 
+def test_a_ray_cluster_that_is_too_small_or_away_is_said_in_one_line(tmp_path, local_ray, monkeypatch):
+    with pytest.raises(UsageError, match="--workers must be at most 2, the CPUs of the Ray cluster, got 3"):
+        compare(replace(CONFIG, workers=3, backend="ray"), tmp_path, run_fake_cell)
+
+
+def test_one_seed_has_no_difference_since_it_would_have_no_interval(tmp_path):
+    summary = compare(replace(CONFIG, seeds=1), tmp_path, run_fake_cell)
+    assert summary["differences"] == []
+    assert (tmp_path / "differences.csv").read_text().strip() == ""
+
+
 def test_the_table_for_people_has_percents_and_intervals(tmp_path):
     summary = compare(CONFIG, tmp_path, run_fake_cell)
     lines = format_table(summary["table"]).splitlines()

@@ -1,17 +1,21 @@
 """A training run in the simulator: killed, resumed, and its agent evaluated."""
 
+import hashlib
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
 from policies.rl import train as training
+from policies.rl.agent_file import read_card
 from policies.rl.checkpoints import latest_checkpoint, load_model
+from policies.rl.compare import CompareConfig, compare
 from policies.rl.config import TrainConfig
-from policies.rl.train import FINAL_FILE, train
+from policies.rl.train import BEST_FILE, FINAL_FILE, TENSORBOARD_FOLDER, train
 
 pytestmark = pytest.mark.sim
 SHORT = TrainConfig(
@@ -38,7 +42,7 @@ def killed_and_resumed(tmp_path_factory):
 
     training.save_checkpoint = save_and_die
     try:
-        with pytest.raises(UsageError, match=r"a worker process ended.*--resume goes on from checkpoint-0000000012"):
+        with pytest.raises(UsageError, match=r"a worker process ended.*--resume`.* goes on from checkpoint-0000000012"):
             train(SHORT, folder)
     finally:
         training.save_checkpoint = save
@@ -69,6 +73,21 @@ def test_a_finished_run_is_not_trained_again(killed_and_resumed):
     assert train(SHORT, folder, resume=True)["curve"] == summary["curve"]
 
 
+def test_the_best_agent_is_the_first_of_the_best_evaluation(killed_and_resumed):
+    summary, folder = killed_and_resumed
+    assert summary["best"] == max(summary["curve"], key=training.rank)
+    assert read_card(folder / BEST_FILE).decisions == summary["best"]["decisions"]
+    assert read_card(folder / FINAL_FILE).decisions == 24
+
+
+def test_tensorboard_has_the_evaluations(killed_and_resumed):
+    summary, folder = killed_and_resumed
+    logs = EventAccumulator(str(folder / TENSORBOARD_FOLDER / "run_0"))
+    logs.Reload()
+    logged = [(event.step, event.value) for event in logs.Scalars("eval/return")]
+    assert logged == [(entry["decisions"], pytest.approx(entry["return"])) for entry in summary["curve"]]
+
+
 def test_its_agent_is_evaluated_and_acts_as_the_model(killed_and_resumed, tmp_path, capsys):
     _, folder = killed_and_resumed
     agent = str(folder / FINAL_FILE)
@@ -84,3 +103,17 @@ def test_its_agent_is_evaluated_and_acts_as_the_model(killed_and_resumed, tmp_pa
     training.write_agent(folder / FINAL_FILE, training.card_of(other, training.Progress()), {})
     assert main(arguments) == 2
     assert "holds another run, with policy_sha256" in capsys.readouterr().err
+
+
+def test_a_comparison_trains_and_tests_its_own_agent_and_the_servo(tmp_path):
+    training = replace(SHORT, steps=12, workers=1, learning_starts=4)
+    config = CompareConfig(configs=("blind",), seeds=1, training=training, scenarios=("clear",), episodes=1)
+    summary = compare(config, tmp_path)
+    servo, blind = summary["runs"]
+    assert (servo["config"], servo["curve"], servo["scenarios"]["clear"]["successes"]) == ("servo", [], 1)
+    assert (blind["config"], [entry["decisions"] for entry in blind["curve"]]) == ("blind", [12])
+    assert blind["scenarios"]["clear"]["episodes"] == 1
+    tested = json.loads((tmp_path / "runs" / "blind-0" / "test" / "run.json").read_text())
+    assert (
+        tested["policy_sha256"] == hashlib.sha256((tmp_path / "runs" / "blind-0" / FINAL_FILE).read_bytes()).hexdigest()
+    )
