@@ -31,7 +31,8 @@ def draw_comparison(summary: dict[str, Any], path: Path) -> None:
             for number, config in enumerate(summary["configs"]):
                 points = [point for point in summary["curves"] if point["config"] == config]
                 x = [unit * point[key] for point in points]
-                label = f"{config}, {points[0]['seeds']} seeds" if points else config
+                seeds = points[0]["seeds"] if points else 0
+                label = f"{config}, {seeds} {'seed' if seeds == 1 else 'seeds'}"
                 ax.plot(x, [point[measure] for point in points], color=f"C{number}", marker=".", label=label)
                 low, high = ([point[f"{measure}_{end}"] for point in points] for end in ("low", "high"))
                 ax.fill_between(x, low, high, color=f"C{number}", alpha=0.2, linewidth=0)
