@@ -1,4 +1,4 @@
-"""PPO for rl-zoo3, with the settings of ``fixation-gym train``."""
+"""PPO for rl-zoo3, with the settings of ``fixation-gym train``. Of ``FixationPick-v0`` see ``sac``."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ from typing import Any
 
 from policies.rl.hyperparameters import PPO_SETTINGS
 
+_COMMON: dict[str, Any] = {**PPO_SETTINGS, "policy": "MultiInputPolicy", "n_envs": 4}
 hyperparams: dict[str, dict[str, Any]] = {
     "FixationPickZFC-v0": {
-        **PPO_SETTINGS,
-        "policy": "MultiInputPolicy",
+        **_COMMON,
         "env_wrapper": "policies.rl.decisions.DecisionEnv",
         "env_kwargs": {"scenario": "mixed", "observation": "zfc", "image_size": (96, 128)},
         "n_timesteps": 200_000,
-        "n_envs": 4,
-    }
+    },
+    "FixationPick-v0": {
+        **_COMMON,
+        "policy_kwargs": {"net_arch": [256, 256], "log_std_init": -0.5},
+        "env_kwargs": {"scenario": "clear", "image_size": (48, 64)},
+        "n_timesteps": 1_000_000,
+    },
 }
