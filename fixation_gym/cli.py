@@ -297,8 +297,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         if error.errno not in _DISK_ERRORS:
             raise
-        advice = "what was finished is kept: make room, and give the same command again"
-        print(f"fixation-gym: error: cannot write ({error.strerror}); {advice}", file=sys.stderr)
+        what = f" {error.filename}" if error.filename else ""
+        advice = "give the same command again when it can; commands that resume keep what was finished"
+        print(f"fixation-gym: error: cannot write{what} ({error.strerror}); {advice}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("fixation-gym: interrupted; what was finished is kept", file=sys.stderr)

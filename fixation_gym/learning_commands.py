@@ -21,7 +21,8 @@ class Train:
     scenario: str = "mixed"
     """Name of the scenario to train on."""
     steps: int = 8_000
-    """Decisions to learn from; 5 per simulated second, and a whole grasp counts as one."""
+    """Decisions to learn from; 5 per simulated second, and a whole grasp counts as one. SAC begins with 1000 random
+    ones."""
     seed: int = 0
     """Chooses scenes and initial weights."""
     workers: int = 4
@@ -80,7 +81,7 @@ class Compare:
     seeds: int = 5
     """Training seeds of every configuration, from 0 on."""
     steps: int = 6_000
-    """Decisions of every training run."""
+    """Decisions of every training run; the first 1000 are random."""
     scenario: str = "mixed"
     """Scenario to train on."""
     test: str = ""

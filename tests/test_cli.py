@@ -189,12 +189,12 @@ def test_a_full_disk_ends_any_command_in_one_line_and_other_system_errors_are_no
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(number: int) -> dict[str, Any]:
-        raise OSError(number, os.strerror(number))
+        raise OSError(number, os.strerror(number), "/data/out")
 
     monkeypatch.setattr(doctor, "diagnose", lambda: fail(errno.ENOSPC))
     assert cli.main(["doctor"]) == 2
     error = capsys.readouterr().err
-    assert "cannot write (No space left on device); what was finished is kept" in error
+    assert "cannot write /data/out (No space left on device); give the same command again" in error
     assert len(error.splitlines()) == 1
     monkeypatch.setattr(doctor, "diagnose", lambda: fail(errno.EAGAIN))
     with pytest.raises(BlockingIOError):

@@ -97,8 +97,8 @@ def _propose(scenario: Scenario, screen: str | None, rng: np.random.Generator) -
         table_texture=str(rng.choice(("table_wood", "table_plank", "table_felt"))),
         distractor=distractor,
     )
-    # Drawn last, so that the scene of a seed is otherwise the same with frames of any colour.
-    return _with_coloured_frames(scene, rng) if scenario.coloured_frames else scene
+    # From a generator of their own: nothing else of the episode, its sensor noise included, depends on the colours.
+    return _with_coloured_frames(scene, rng.spawn(1)[0]) if scenario.coloured_frames else scene
 
 
 # -- what a scene must be ------------------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ def run_cells(
     Raises:
         UsageError: if a worker process dies.
     """
-    if workers == 1 and backend == "loky":
+    if not cells or (workers == 1 and backend == "loky"):
         yield from map(run, cells)
         return
     import joblib
@@ -139,24 +139,27 @@ def run_cells(
             parallel = joblib.Parallel(n_jobs=workers, backend="ray")
             yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells[start : start + batch]))
     except RayError as error:
+        reason = str(error).strip().splitlines()[-1]
         raise UsageError(
-            f"a Ray worker died ({type(error).__name__}); what is finished is kept, and the same command goes on"
+            f"Ray says {type(error).__name__}: {reason}; finished batches are kept, and the same command goes on"
         ) from error
 
 
 def _join_cluster(workers: int) -> None:
-    """Join the Ray cluster of RAY_ADDRESS. Without one, joblib's backend starts one on this machine.
+    """Join the Ray cluster of RAY_ADDRESS or of this machine. If there is none, joblib's backend starts one.
 
     Raises:
-        UsageError: if it cannot be reached or has fewer CPUs than ``workers``.
+        UsageError: if there is none at RAY_ADDRESS, or it has fewer CPUs than ``workers``.
     """
     import ray  # pyright: ignore[reportMissingImports]
 
-    if not ray.is_initialized() and "RAY_ADDRESS" in os.environ:
+    address = os.environ.get("RAY_ADDRESS")
+    if not ray.is_initialized() and address != "local":
         try:
-            ray.init()
-        except ConnectionError as error:
-            raise UsageError(f"no Ray cluster at RAY_ADDRESS={os.environ['RAY_ADDRESS']}: start one there") from error
+            ray.init("auto")
+        except (ConnectionError, ValueError) as error:
+            if address is not None:
+                raise UsageError(f"there is no Ray cluster at RAY_ADDRESS={address}; start or unset it") from error
     if ray.is_initialized() and workers > (cpus := int(ray.cluster_resources().get("CPU", 0))):
         raise UsageError(f"--workers must be at most {cpus}, the CPUs of the Ray cluster, got {workers}")
 

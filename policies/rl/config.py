@@ -80,9 +80,10 @@ class TrainConfig:
                 raise UsageError(f"--{name.replace('_', '-')} must be at least 1, got {getattr(self, name)}")
         if not 0 <= self.seed < 1000:
             raise UsageError(f"--seed must be within 0..999, got {self.seed}")
-        if self.algorithm == "sac" and self.steps <= self.learning_starts:
+        random_steps = self.learning_starts + self.workers  # learning lags behind by one step of all environments
+        if self.algorithm == "sac" and self.steps <= random_steps:
             raise UsageError(
-                f"--steps must be above {self.learning_starts}, after so many random ones SAC learns, got {self.steps}"
+                f"--steps must be above {random_steps}, since SAC learns after so many random ones, got {self.steps}"
             )
         if self.checkpoint_minutes <= 0.0:
             raise UsageError(f"--checkpoint-minutes must be above 0, got {self.checkpoint_minutes}")

@@ -50,8 +50,7 @@ def train(config: TrainConfig, out: Path, resume: bool = False) -> dict[str, Any
     with folder_lock(out), _writing(out):
         checkpoint = _check_folder(config, out, resume)
         progress = Progress() if checkpoint is None else read_progress(checkpoint)
-        if progress.decisions > config.steps and not progress.curve:
-            raise UsageError(f"{out} already has {progress.decisions} decisions; --steps must not be less")
+        _check_steps(config, out, progress)
         write_json(out / RUN_FILE, config.identity())
         with worker_deaths(lambda: _advice(out)):
             if progress.decisions < config.steps:
@@ -190,6 +189,17 @@ def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
     if not resume:
         raise UsageError(f"{out} holds a training run; add --resume to go on with it, or choose another --out")
     return checkpoint
+
+
+def _check_steps(config: TrainConfig, out: Path, progress: Progress) -> None:
+    """Check that a run has not gone beyond the steps that are asked for, since its last evaluation.
+
+    Raises:
+        UsageError: if so; agents are written and rated at evaluations only.
+    """
+    evaluated = progress.curve[-1]["decisions"] if progress.curve else 0
+    if config.steps <= progress.decisions != evaluated:
+        raise UsageError(f"{out} has {progress.decisions} decisions already; --steps must be above that")
 
 
 @contextlib.contextmanager

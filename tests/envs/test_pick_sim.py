@@ -99,13 +99,16 @@ def test_the_fast_view_shows_what_the_view_in_full_quality_shows(scenario):
 
 
 def test_a_coloured_frame_is_drawn_in_its_colour_and_all_else_as_before():
-    images = []
+    images, readings = [], []
     for scenario in ("screen", "screen_coloured"):
-        env = gym.make("FixationPick-v0", scenario=scenario, sensor_noise="ideal", image_size=(120, 160)).unwrapped
-        obs, _ = env.reset(seed=1)
-        images.append(obs["rgb"].astype(np.float32))
+        env = gym.make("FixationPick-v0", scenario=scenario, image_size=(120, 160)).unwrapped
+        env.reset(seed=1)
+        readings.append(env.step(np.zeros(7, np.float32))[0])
+        images.append(readings[-1].pop("rgb").astype(np.float32))
         frame = np.array(env.scene.obstacles[0].frame_rgba[:3])
         env.close()
+    for name, reading in readings[0].items():
+        np.testing.assert_array_equal(reading, readings[1][name], err_msg=name)
     other = np.abs(images[1] - images[0]).max(axis=-1) > 0
     assert 0.02 < other.mean() < 0.4
     seen = np.median(images[1][other], axis=0)

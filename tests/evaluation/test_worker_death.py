@@ -1,4 +1,4 @@
-"""A worker process that dies."""
+"""Workers that die, or cannot be had."""
 
 import os
 import signal
@@ -19,3 +19,9 @@ def test_a_killed_worker_ends_with_one_sentence():
     cells = [{"number": number} for number in range(4)]
     with pytest.raises(UsageError, match="the same command goes on"):
         list(run_cells(cells, 2, run=die_at_two))
+
+
+def test_an_address_without_a_ray_cluster_is_named(monkeypatch):
+    monkeypatch.setenv("RAY_ADDRESS", "nowhere")
+    with pytest.raises(UsageError, match="there is no Ray cluster at RAY_ADDRESS=nowhere; start or unset it"):
+        list(run_cells([{}], 2, "ray", dict))

@@ -133,7 +133,7 @@ def train(*options):
         (("--algorithm", "dqn"), "choose one of sac, ppo"),
         (("--workers", "0"), "--workers must be at least 1"),
         (("--seed", "-1"), "--seed must be within 0..999"),
-        (("--steps", "1000"), "--steps must be above 1000, after so many random ones SAC learns, got 1000"),
+        (("--steps", "1004"), "--steps must be above 1004, since SAC learns after so many random ones, got 1004"),
         (("--resume",), "holds no training run to resume"),
     ],
 )
@@ -167,11 +167,12 @@ def test_checkpoints_of_a_run_that_is_not_described_are_left_alone(tmp_path, opt
     assert list(tmp_path.iterdir()) == [earlier]
 
 
-def test_fewer_steps_than_a_run_has_without_an_evaluation_are_refused(tmp_path, capsys, model):
+@pytest.mark.parametrize("curve", [[], [{"decisions": 1500}]])
+def test_no_more_steps_than_a_run_has_are_refused_if_its_agent_was_not_evaluated_since(tmp_path, capsys, model, curve):
     write_json(tmp_path / RUN_FILE, TrainConfig().identity())
-    save_checkpoint(tmp_path, model, Progress(2500))
+    save_checkpoint(tmp_path, model, Progress(2000, curve=curve))
     assert train("--resume", "--out", str(tmp_path)) == 2
-    assert "already has 2500 decisions; --steps must not be less" in capsys.readouterr().err
+    assert "has 2000 decisions already; --steps must be above that" in capsys.readouterr().err
 
 
 def test_a_disk_that_fills_up_is_reported_in_one_line_with_what_is_left(tmp_path, monkeypatch, capsys):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -89,15 +90,16 @@ def test_seeds_can_be_added_but_not_other_training(tmp_path):
         compare(replace(CONFIG, training=TrainConfig(steps=5)), tmp_path, run_fake_cell)
 
 
-@pytest.fixture
-def local_ray(monkeypatch):
+@pytest.fixture(scope="module")
+def local_ray():
     """A Ray cluster on this machine, whose workers can import this file."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
     import ray
 
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-    yield
-    ray.shutdown()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(Path(__file__).parent))
+        ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+        yield
+        ray.shutdown()
 
 
 @pytest.mark.parametrize("backend", ["loky", "ray"])
@@ -110,9 +112,26 @@ def test_a_backend_finds_what_this_process_finds(tmp_path, backend, request):
         assert there[part] == here[part]
 
 
-def test_a_ray_cluster_that_is_too_small_or_away_is_said_in_one_line(tmp_path, local_ray, monkeypatch):
-    with pytest.raises(UsageError, match="--workers must be at most 2, the CPUs of the Ray cluster, got 3"):
-        compare(replace(CONFIG, workers=3, backend="ray"), tmp_path, run_fake_cell)
+def run_and_die(cell):
+    os._exit(1)
+
+
+def run_badly(cell):
+    raise UsageError("the agent is damaged")
+
+
+@pytest.mark.parametrize(
+    ("workers", "run", "message"),
+    [
+        (3, run_fake_cell, "--workers must be at most 2, the CPUs of the Ray cluster, got 3"),
+        (2, run_and_die, "Ray says .*Error: .*; finished batches are kept, and the same command goes on"),
+        (2, run_badly, "^the agent is damaged$"),
+    ],
+)
+def test_what_goes_wrong_on_a_ray_cluster_is_said_in_one_line(tmp_path, local_ray, workers, run, message):
+    with pytest.raises(UsageError, match=message) as caught:
+        compare(replace(CONFIG, workers=workers, backend="ray"), tmp_path, run)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_one_seed_has_no_difference_since_it_would_have_no_interval(tmp_path):

@@ -106,8 +106,8 @@ def test_its_agent_is_evaluated_and_acts_as_the_model(killed_and_resumed, tmp_pa
 
 
 def test_a_comparison_trains_and_tests_its_own_agent_and_the_servo(tmp_path):
-    training = replace(SHORT, steps=12, workers=1, learning_starts=4)
-    config = CompareConfig(configs=("blind",), seeds=1, training=training, scenarios=("clear",), episodes=1)
+    short = replace(SHORT, steps=12, workers=1, learning_starts=4)
+    config = CompareConfig(configs=("blind",), seeds=1, training=short, scenarios=("clear",), episodes=1)
     summary = compare(config, tmp_path)
     servo, blind = summary["runs"]
     assert (servo["config"], servo["curve"], servo["scenarios"]["clear"]["successes"]) == ("servo", [], 1)

@@ -1,10 +1,11 @@
-"""PPO for rl-zoo3, with the settings of ``fixation-gym train``. Of ``FixationPick-v0`` see ``sac``."""
+"""PPO for rl-zoo3, with the settings of ``fixation-gym train``. ``sac`` says what ``FixationPick-v0`` is for."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from policies.rl.hyperparameters import PPO_SETTINGS
+from policies.rl.decisions import PERIODS
+from policies.rl.hyperparameters import GAMMA, PPO_SETTINGS
 
 _COMMON: dict[str, Any] = {**PPO_SETTINGS, "policy": "MultiInputPolicy", "n_envs": 4}
 hyperparams: dict[str, dict[str, Any]] = {
@@ -16,6 +17,7 @@ hyperparams: dict[str, dict[str, Any]] = {
     },
     "FixationPick-v0": {
         **_COMMON,
+        "gamma": GAMMA ** (1.0 / PERIODS),  # per control step
         "policy_kwargs": {"net_arch": [256, 256], "log_std_init": -0.5},
         "env_kwargs": {"scenario": "clear", "image_size": (48, 64)},
         "n_timesteps": 1_000_000,

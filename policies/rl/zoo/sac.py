@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from policies.rl.hyperparameters import SAC_SETTINGS
+from policies.rl.decisions import PERIODS
+from policies.rl.hyperparameters import GAMMA, SAC_SETTINGS
 
 _COMMON: dict[str, Any] = {
     **SAC_SETTINGS,
@@ -27,6 +28,7 @@ hyperparams: dict[str, dict[str, Any]] = {
     },
     "FixationPick-v0": {
         **_COMMON,
+        "gamma": GAMMA ** (1.0 / PERIODS),  # per control step
         "policy_kwargs": {"net_arch": [256, 256]},
         "env_kwargs": {"scenario": "clear", "image_size": (48, 64)},
         "n_timesteps": 200_000,
