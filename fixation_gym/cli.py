@@ -225,7 +225,8 @@ class Doctor:
         if self.out is None:
             diagnosis = diagnose()
         else:  # imports packages whose absence is for diagnose to report
-            from fixation_gym.evaluation.storage import SUMMARY_FILE, make_folder, write_json
+            from fixation_gym.evaluation.files import write_json
+            from fixation_gym.evaluation.storage import SUMMARY_FILE, make_folder
 
             make_folder(self.out)
             diagnosis = diagnose()

@@ -12,11 +12,12 @@ from tqdm import tqdm
 
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.failures import classify
+from fixation_gym.evaluation.files import write_file
 from fixation_gym.evaluation.folders import Evaluation, read_evaluation
 from fixation_gym.evaluation.rollout import EpisodeResult, run_episode
 from fixation_gym.evaluation.storage import folder_lock, make_folder
 from fixation_gym.evaluation.trace import Trace
-from fixation_gym.evaluation.video import caption, contact_sheet, jpeg, shrink, write_file
+from fixation_gym.evaluation.video import caption, contact_sheet, jpeg, shrink
 from fixation_gym.types import ImageArray
 
 CLIPS_FOLDER = "clips"

@@ -15,6 +15,7 @@ from tqdm import tqdm
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import EvaluationConfig, summary_of
+from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.rollout import EpisodeResult, run_episode
 from fixation_gym.evaluation.storage import (
     EPISODES_FILE,
@@ -25,7 +26,6 @@ from fixation_gym.evaluation.storage import (
     check_no_folders,
     folder_lock,
     make_folder,
-    write_json,
 )
 from fixation_gym.evaluation.video import VideoWriter, caption, contact_sheet, evenly_spaced, shrink, write_png
 from fixation_gym.types import ImageArray

@@ -14,11 +14,12 @@ from typing import Any
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
+from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.report import summarise
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeKey, EpisodeStore, write_json
+from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeKey, EpisodeStore
 
 SEED_BLOCK = 100_000
 """Episode i of ``--seed S`` has seed S * SEED_BLOCK + i, in every scenario: policies meet the same scenes."""

@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.trace import TRACES_FOLDER, trace_file, write_trace
 
@@ -80,20 +81,6 @@ def check_no_folders(folder: Path, names: Iterable[str]) -> None:
     for name in names:
         if (folder / name).is_dir():
             raise UsageError(f"{folder / name} is a folder where a file is needed; choose another --out")
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write JSON so that the file has its old or its new content, but never half of it."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump(value, file, indent=2, allow_nan=False)
-            file.write("\n")
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 class ResultStore(Generic[Key, Result]):

@@ -10,6 +10,7 @@ import cv2
 import imageio_ffmpeg
 import numpy as np
 
+from fixation_gym.evaluation.files import write_file
 from fixation_gym.types import ImageArray
 
 _CAPTION_HEIGHT = 26
@@ -121,20 +122,6 @@ def write_png(path: Path, image: ImageArray) -> None:
         OSError: if it cannot be written.
     """
     write_file(path, _encoded(".png", image, []))
-
-
-def write_file(path: Path, data: bytes) -> None:
-    """Write a file, completely or not at all.
-
-    Raises:
-        OSError: if it cannot be written.
-    """
-    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        temporary.write_bytes(data)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _encoded(extension: str, image: ImageArray, options: list[int]) -> bytes:

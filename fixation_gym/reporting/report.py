@@ -10,6 +10,7 @@ from typing import Any
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.evaluate import seed_hash
+from fixation_gym.evaluation.files import write_file, write_json
 from fixation_gym.evaluation.folders import evaluation_folders, read_evaluation
 from fixation_gym.evaluation.report import summarise
 from fixation_gym.evaluation.storage import (
@@ -19,9 +20,7 @@ from fixation_gym.evaluation.storage import (
     check_no_folders,
     folder_lock,
     make_folder,
-    write_json,
 )
-from fixation_gym.evaluation.video import write_file
 from fixation_gym.reporting import sections
 from fixation_gym.reporting.comparison import compare_success, compare_values
 from fixation_gym.reporting.digest import PolicyRecord, digest, scenario_names

@@ -17,7 +17,7 @@ from stable_baselines3.common.buffers import DictReplayBuffer
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.storage import write_json
+from fixation_gym.evaluation.files import write_json
 
 _MODEL, _REPLAY, _PROGRESS = "model.zip", "replay.npz", "progress.json"
 _PREFIX, _UNFINISHED = "checkpoint-", ".unfinished"

@@ -12,9 +12,10 @@ from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
+from fixation_gym.evaluation.files import write_csv, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, ResultStore, write_json
+from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, ResultStore
 from policies.catalogue import surroundings
 from policies.rl.comparison_tables import (
     CURVES_FILE,
@@ -24,7 +25,6 @@ from policies.rl.comparison_tables import (
     curves_of,
     differences_of,
     table_of,
-    write_csv,
 )
 from policies.rl.config import CONFIGS, TrainConfig
 

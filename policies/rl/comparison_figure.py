@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fixation_gym.evaluation.video import write_file
+from fixation_gym.evaluation.files import write_file
 
 _AXES = (("env_steps", 1e-3, "control steps, thousands"), ("wall_min", 1.0, "training, minutes"))
 _ROWS = (("success", "success"), ("collision_free", "success without collision"))

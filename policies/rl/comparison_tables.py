@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fixation_gym.evaluation.statistics import wilson_interval
-from fixation_gym.evaluation.video import write_file
 from policies.rl.aggregates import bootstrap_interval, interquartile_mean
 
 CURVES_FILE, TABLE_FILE, DIFFERENCES_FILE, FIGURE_FILE = "curves.csv", "table.csv", "differences.csv", "comparison.png"
@@ -113,15 +109,6 @@ def _percent(row: dict[str, Any], sign: str = "") -> str:
         value, low, high = (100.0 * row[measure + end] for end in ("", "_low", "_high"))
         cells += f"{value:{sign}11.0f} [{low:{sign}4.0f}, {high:{sign}4.0f}]"
     return cells
-
-
-def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Write rows that have the same keys."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_file(path, text.getvalue().encode())
 
 
 def _configs(results: Sequence[dict[str, Any]]) -> list[str]:

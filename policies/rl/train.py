@@ -16,8 +16,9 @@ from tqdm import tqdm
 
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, check_same_run, folder_lock, make_folder, write_json
+from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, check_same_run, folder_lock, make_folder
 from policies.rl.agent_file import AgentCard, write_agent
 from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
 from policies.rl.config import TrainConfig

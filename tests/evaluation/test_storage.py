@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import pytest
 from evaluation_fakes import FakeEnv, FakePolicy
 
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.rollout import run_episode
 from fixation_gym.evaluation.storage import (
     EPISODES_FILE,
@@ -19,7 +19,6 @@ from fixation_gym.evaluation.storage import (
     EpisodeStore,
     folder_lock,
     make_folder,
-    write_json,
 )
 
 RUN = {"policy": "servo", "image_size": (240, 320)}
@@ -150,12 +149,3 @@ def test_a_folder_that_cannot_be_made_is_an_error_and_leaves_nothing(tmp_path: P
     with pytest.raises(UsageError, match="cannot write to the output folder"):
         make_folder(tmp_path / "file" / "out")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_a_failed_write_keeps_the_old_file_and_leaves_no_other(tmp_path: Path) -> None:
-    path = tmp_path / "summary.json"
-    write_json(path, {"a": 1})
-    with pytest.raises(ValueError, match="JSON"):
-        write_json(path, {"a": float("nan")})
-    assert json.loads(path.read_text()) == {"a": 1}
-    assert list(tmp_path.iterdir()) == [path]

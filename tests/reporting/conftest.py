@@ -10,8 +10,9 @@ from evaluation_fakes import FakeEnv, FakePolicy
 from made_traces import make_trace
 
 from fixation_gym.evaluation.evaluate import EvaluationConfig, summary_of
+from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.rollout import EpisodeResult, run_episode
-from fixation_gym.evaluation.storage import EpisodeStore, write_json
+from fixation_gym.evaluation.storage import EpisodeStore
 from fixation_gym.evaluation.trace import Trace
 
 BASE = replace(run_episode(FakeEnv(), FakePolicy(), seed=2), trace=None)

@@ -13,7 +13,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.storage import RUN_FILE, write_json
+from fixation_gym.evaluation.files import write_json
+from fixation_gym.evaluation.storage import RUN_FILE
 from policies.rl import train as training
 from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
 from policies.rl.config import TRAIN_SEEDS, TrainConfig

@@ -18,7 +18,8 @@ import numpy as np
 from tqdm import tqdm
 
 from fixation_gym.doctor import installed_versions
-from fixation_gym.evaluation.storage import SUMMARY_FILE, folder_lock, make_folder, write_json
+from fixation_gym.evaluation.files import write_json
+from fixation_gym.evaluation.storage import SUMMARY_FILE, folder_lock, make_folder
 from fixation_gym.experiments.bench.cases import all_groups
 from fixation_gym.experiments.bench.figure import draw_figure
 from fixation_gym.experiments.bench.groups import Group, ProcessGroup

@@ -16,11 +16,12 @@ from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.files import write_csv, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
-from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders, write_json
+from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders
 from fixation_gym.experiments.distance.duck_print import valid_widths
 from fixation_gym.experiments.distance.sequence import INTRINSICS, Condition, Motion
-from fixation_gym.experiments.distance.statistics import summarise, write_csv
+from fixation_gym.experiments.distance.statistics import summarise
 
 if TYPE_CHECKING:
     from fixation_gym.experiments.distance.rig import PrintRig

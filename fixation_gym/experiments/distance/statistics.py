@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -228,13 +226,3 @@ def format_table(summary: dict[str, Any]) -> str:
 
 def _number(value: float | None, scale: float) -> str:
     return "-" if value is None else f"{value * scale:.3g}"
-
-
-def write_csv(path: Path, rows: Sequence[Row]) -> None:
-    """Write the rows, one line each; lists with blanks between their items."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else [])
-        writer.writeheader()
-        for row in rows:
-            values = {k: " ".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()}
-            writer.writerow(values)

@@ -16,10 +16,11 @@ from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.files import write_csv, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
-from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders, write_json
+from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders
 from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
-from fixation_gym.experiments.scenarios.statistics import summarise, write_csv
+from fixation_gym.experiments.scenarios.statistics import rows_of, summarise
 
 if TYPE_CHECKING:
     from fixation_gym.experiments.scenarios.rig import ScenarioRig
@@ -176,7 +177,7 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
             "wall_s": time.monotonic() - started,
         }
         write_json(out / SUMMARY_FILE, summary)
-        write_csv(out / CSV_FILE, summary["scenes"])
+        write_csv(out / CSV_FILE, rows_of(summary["scenes"]))
         if config.film:
             from fixation_gym.experiments.scenarios.pictures import film
 

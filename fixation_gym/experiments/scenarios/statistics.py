@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -137,13 +135,9 @@ def bootstrap_ratio(pairs: Sequence[tuple[float, float]]) -> tuple[float | None,
     return float(part / whole), [float(low), float(high)]
 
 
-def write_csv(path: Path, scenes: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
-    """Write all rows; an interval becomes two columns."""
-    rows = [{"scene": scene, **_flat(row)} for scene, rows in scenes.items() for row in rows]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(dict.fromkeys(name for row in rows for name in row)))
-        writer.writeheader()
-        writer.writerows(rows)
+def rows_of(scenes: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    """All rows as one table; an interval becomes two columns."""
+    return [{"scene": scene, **_flat(row)} for scene, rows in scenes.items() for row in rows]
 
 
 def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
