@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
@@ -18,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.files import write_file
 from fixation_gym.types import FloatArray, MaskArray
 from policies.base import Estimate
 
@@ -142,12 +142,7 @@ def trace_file(folder: Path, scenario: str, seed: int) -> Path:
 def write_trace(path: Path, trace: Trace) -> None:
     """Write a trace, completely or not at all; the same trace gives the same bytes."""
     path.parent.mkdir(exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(_pack(trace))
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_file(path, _pack(trace))
 
 
 def read_trace(path: Path) -> Trace | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.files import write_file
 from policies.rl.config import ALGORITHMS, CONFIGS
 
 FORMAT = 1
@@ -49,16 +49,12 @@ def write_agent(path: Path, card: AgentCard, weights: Mapping[str, Any]) -> None
     """
     import torch
 
-    buffer = io.BytesIO()
-    torch.save(dict(weights), buffer)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as file:
-            file.writestr(_CARD, json.dumps(asdict(card), indent=2))
-            file.writestr(_WEIGHTS, buffer.getvalue())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    actor, agent = io.BytesIO(), io.BytesIO()
+    torch.save(dict(weights), actor)
+    with zipfile.ZipFile(agent, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr(_CARD, json.dumps(asdict(card), indent=2))
+        file.writestr(_WEIGHTS, actor.getvalue())
+    write_file(path, agent.getvalue())
 
 
 def read_card(path: Path) -> AgentCard:

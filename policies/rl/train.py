@@ -47,6 +47,8 @@ def train(config: TrainConfig, out: Path, resume: bool = False) -> dict[str, Any
     Raises:
         UsageError: if the folder cannot be used, holds another run, the disk is full, or a worker process died.
     """
+    if resume and not out.exists():
+        raise _nothing_to_resume(out)
     make_folder(out)
     with folder_lock(out), _writing(out):
         checkpoint = _check_folder(config, out, resume)
@@ -184,12 +186,16 @@ def _check_folder(config: TrainConfig, out: Path, resume: bool) -> Path | None:
         if checkpoint is not None:
             raise UsageError(f"{out} has {checkpoint.name} but no {RUN_FILE}; choose another --out")
         if resume:
-            raise UsageError(f"{out} holds no training run to resume; leave out --resume to start one")
+            raise _nothing_to_resume(out)
         return None
     check_same_run(path, config.identity())
     if not resume:
         raise UsageError(f"{out} holds a training run; add --resume to go on with it, or choose another --out")
     return checkpoint
+
+
+def _nothing_to_resume(out: Path) -> UsageError:
+    return UsageError(f"{out} holds no training run to resume; leave out --resume to start one")
 
 
 def _check_steps(config: TrainConfig, out: Path, progress: Progress) -> None:

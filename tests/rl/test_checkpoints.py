@@ -143,6 +143,7 @@ def test_bad_options_end_in_one_line(tmp_path, options, message, capsys):
     error = capsys.readouterr().err
     assert message in error
     assert len(error.splitlines()) == 1
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
