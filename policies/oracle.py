@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from fixation_gym.control import servo_laws
 from fixation_gym.control.corridor import Box, approach_directions, free_directions, level_axes
+from fixation_gym.envs.motion import places
 from fixation_gym.envs.object_pool import target_shape
-from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec, reachable_directions
+from fixation_gym.envs.reach import reachable_directions
+from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import FloatArray
 from policies.base import Action, Estimate
@@ -163,7 +165,7 @@ class OraclePolicy:
         boxes = [] if self._scene.distractor is None else [self._scene.distractor.box]
         for obstacle in self._scene.obstacles:
             over = obstacle.motion is not None and time > obstacle.motion.end_s
-            boxes += obstacle.boxes[-1:] if over else obstacle.boxes
+            boxes += obstacle.boxes_at(places(obstacle.motion)[-1]) if over else obstacle.boxes
         return boxes
 
     @property

@@ -5,7 +5,10 @@ Used by the servo on what it has seen, by the scene sampler, so that every scene
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -44,11 +47,49 @@ _BOXES = _swept_boxes()
 
 @dataclass(frozen=True)
 class Box:
-    """An upright box around an object, in the robot base frame."""
+    """A box around an object or a part of it, in the robot base frame."""
 
     centre: FloatArray
     half_extent: FloatArray
     yaw: float
+    """Rotation about the vertical, rad."""
+    pitch: float = 0.0
+    """Rotation about the box's y axis before ``yaw``, rad; 0: upright."""
+
+    @property
+    def rotation(self) -> FloatArray:
+        """Rotation of the box's axes in base, shape (3, 3)."""
+        cy, sy, cp, sp = math.cos(self.yaw), math.sin(self.yaw), math.cos(self.pitch), math.sin(self.pitch)
+        return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
+
+
+class BoxSet(NamedTuple):
+    """Boxes as arrays, for tests of many."""
+
+    centres: FloatArray
+    """Shape (n, 3), in base, m."""
+    rotations: FloatArray
+    """Axes of each box in base, shape (n, 3, 3)."""
+    halves: FloatArray
+    """Half sizes, shape (n, 3), m."""
+
+    def moved(self, offset: FloatArray) -> BoxSet:
+        """The same boxes elsewhere; ``offset`` has shape (3,), m."""
+        return self._replace(centres=self.centres + offset)
+
+
+def box_set(boxes: Sequence[Box]) -> BoxSet:
+    """Boxes as arrays."""
+    if not boxes:
+        return BoxSet(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
+    centres = np.array([box.centre for box in boxes])
+    halves = np.array([box.half_extent for box in boxes])
+    return BoxSet(centres, np.array([box.rotation for box in boxes]), halves)
+
+
+def joined(first: BoxSet, second: BoxSet) -> BoxSet:
+    """All boxes of both."""
+    return BoxSet(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
 
 
 def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
@@ -61,7 +102,11 @@ def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatAr
 
 
 def free_directions(
-    target: FloatArray, obstacles: list[Box], directions: FloatArray, margin: float, rolls: FloatArray | None = None
+    target: FloatArray,
+    obstacles: Sequence[Box] | BoxSet,
+    directions: FloatArray,
+    margin: float,
+    rolls: FloatArray | None = None,
 ) -> MaskArray:
     """Tell for each direction whether the hand can come straight in without touching an obstacle.
 
@@ -75,18 +120,21 @@ def free_directions(
     Returns:
         Mask of shape (n,).
     """
-    if not obstacles:
-        return np.ones(len(directions), dtype=bool)
+    boxes = obstacles if isinstance(obstacles, BoxSet) else box_set(obstacles)
+    return np.asarray(~any_meets(target, hand_axes(directions, rolls), *boxes, *swept_hand(margin)))
+
+
+def hand_axes(directions: FloatArray, rolls: FloatArray | None = None) -> FloatArray:
+    """Rows x, y, z of cameras that look against the directions, shape (n, 3, 3): level, or turned by ``rolls``, (n,).
+
+    A roll is clockwise, seen along the approach, in rad.
+    """
     axes = level_axes(directions)
-    if rolls is not None:
-        c, s = np.cos(rolls)[:, None], np.sin(rolls)[:, None]
-        right, down = axes[:, 0], axes[:, 1]
-        axes = np.stack([c * right + s * down, c * down - s * right, axes[:, 2]], axis=1)
-    turns = np.stack([_yaw_matrix(box.yaw) for box in obstacles])
-    rotations = axes[:, None] @ turns  # of every box in every camera
-    offsets = (np.stack([box.centre for box in obstacles]) - target) @ axes.transpose(0, 2, 1)
-    halves = np.stack([box.half_extent for box in obstacles])
-    return np.asarray(~_any_meets(rotations, offsets, halves, *_centre_and_half(margin)))
+    if rolls is None:
+        return axes
+    c, s = np.cos(rolls)[:, None], np.sin(rolls)[:, None]
+    right, down = axes[:, 0], axes[:, 1]
+    return np.stack([c * right + s * down, c * down - s * right, axes[:, 2]], axis=1)
 
 
 def in_corridor(points: FloatArray, margin: float) -> MaskArray:
@@ -100,10 +148,10 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
         Mask of shape (...).
     """
     flat = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-    return np.asarray(_any_holds(flat, *_centre_and_half(margin)).reshape(points.shape[:-1]))
+    return np.asarray(_any_holds(flat, *swept_hand(margin)).reshape(points.shape[:-1]))
 
 
-def _centre_and_half(margin: float) -> tuple[FloatArray, FloatArray]:
+def swept_hand(margin: float) -> tuple[FloatArray, FloatArray]:
     """Centres and half sizes of the swept boxes, widened by a margin; each of shape (n, 3), m."""
     return 0.5 * (_BOXES[:, 0] + _BOXES[:, 1]), 0.5 * (_BOXES[:, 1] - _BOXES[:, 0]) + margin
 
@@ -116,11 +164,6 @@ def level_axes(directions: FloatArray) -> FloatArray:
     down = (-z * right_y, z * right_x, x * right_y - y * right_x)  # forward x right
     rows = (right_x, right_y, np.zeros_like(x), *down, x, y, z)
     return np.stack(rows, axis=1).reshape(-1, 3, 3)
-
-
-def _yaw_matrix(yaw: float) -> FloatArray:
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @njit(cache=True)
@@ -139,17 +182,27 @@ def _any_holds(points: FloatArray, centres: FloatArray, halves: FloatArray) -> M
 
 
 @njit(cache=True)
-def _any_meets(
-    rotations: FloatArray, offsets: FloatArray, turned_halves: FloatArray, centres: FloatArray, halves: FloatArray
+def any_meets(
+    target: FloatArray,
+    axes: FloatArray,
+    places: FloatArray,
+    turns: FloatArray,
+    turned_halves: FloatArray,
+    centres: FloatArray,
+    halves: FloatArray,
 ) -> MaskArray:
-    """For each of n cameras, whether a turned box, (n, m, 3, 3) and (n, m, 3), meets one of the aligned ones."""
-    hit = np.zeros(len(offsets), np.bool_)
-    for camera in range(len(offsets)):
-        for i in range(len(turned_halves)):
+    """For each of n cameras, axes (n, 3, 3), whether one of m turned boxes meets one of the aligned ones."""
+    hit = np.zeros(len(axes), np.bool_)
+    for camera in range(len(axes)):
+        for i in range(len(places)):
+            offset = axes[camera] @ (places[i] - target)
+            rotation = axes[camera] @ turns[i]
             for box in range(len(centres)):
-                offset = offsets[camera, i] - centres[box]
-                if not hit[camera]:
-                    hit[camera] = _boxes_meet(offset, rotations[camera, i], turned_halves[i], halves[box])
+                if _boxes_meet(offset - centres[box], rotation, turned_halves[i], halves[box]):
+                    hit[camera] = True
+                    break
+            if hit[camera]:
+                break
     return hit
 
 
@@ -171,3 +224,39 @@ def _boxes_meet(offset: FloatArray, rotation: FloatArray, turned: FloatArray, ha
             if abs(offset[b] * rotation[a, j] - offset[a] * rotation[b, j]) > reach:
                 return False
     return True
+
+
+def boxes_meet(first: BoxSet, second: BoxSet, gap: float) -> bool:
+    """Whether a box of one set comes nearer than about ``gap`` m to one of the other."""
+    return bool(any_pair_meets(first.centres, first.rotations, first.halves + gap, *second))
+
+
+def hand_boxes(T_base_cam: FloatArray) -> BoxSet:
+    """Boxes around the parts of the hand of a camera at a pose, shape (4, 4)."""
+    rotation = T_base_cam[:3, :3]
+    tool = T_base_cam[:3, 3] + rotation @ TOOL_IN_CAMERA
+    middles, halves = 0.5 * (_PARTS[:, 0] + _PARTS[:, 1]), 0.5 * (_PARTS[:, 1] - _PARTS[:, 0])
+    return BoxSet(tool + middles @ rotation.T, np.repeat(rotation[None], len(_PARTS), axis=0), halves)
+
+
+@njit(cache=True)
+def any_pair_meets(
+    places: FloatArray,
+    turns: FloatArray,
+    halves: FloatArray,
+    others: FloatArray,
+    other_turns: FloatArray,
+    other_halves: FloatArray,
+) -> bool:
+    """Whether one of n turned boxes, (n, 3), (n, 3, 3), (n, 3), meets one of m others."""
+    for i in range(len(places)):
+        reach = np.sqrt(np.sum(halves[i] ** 2))
+        for j in range(len(others)):
+            apart = others[j] - places[i]
+            if np.sqrt(np.sum(apart**2)) > reach + np.sqrt(np.sum(other_halves[j] ** 2)):
+                continue
+            offset = turns[i].T @ apart
+            rotation = turns[i].T @ other_turns[j]
+            if _boxes_meet(offset, rotation, other_halves[j], halves[i]):
+                return True
+    return False

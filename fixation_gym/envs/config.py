@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
-from fixation_gym.envs.object_pool import MAX_OBSTACLES, OBSTACLE_KINDS, TARGET_SHAPES
+from fixation_gym.envs.object_pool import MAX_OBSTACLES, TARGET_SHAPES
+from fixation_gym.envs.obstacle_kinds import KIND_NAMES, MATERIALS
 
 CONTROL_FREQUENCY = 25
 """Control steps per second."""
@@ -20,9 +21,11 @@ COLLISION_FORCE = 1.0
 """Robot-obstacle contact force above which a contact is a collision, N."""
 COLLISION_PUSH = 0.01
 """Distance an obstacle may be pushed by the robot before it is a collision, m."""
+TABLE_FORCE = 5.0
+"""Robot-table contact force above which a contact is a collision, N."""
 
-OBSTACLE_MOTIONS = ("still", "driven", "pushed")
-"""What an obstacle may do: stand, move to and fro at constant speed, be pushed to another place once."""
+OBSTACLE_MOTIONS = ("driven", "pushed")
+"""What a moving obstacle may do: go to and fro at constant speed, or be pushed to another place once."""
 
 
 @dataclass(frozen=True)
@@ -30,21 +33,31 @@ class Scenario:
     """Recipe from which scenes are sampled."""
 
     name: str = "custom"
-    obstacle_kinds: tuple[str, ...] = ()
-    """Kinds to draw from, one of ``OBSTACLE_KINDS`` for each obstacle."""
+    obstacle_materials: tuple[str, ...] = ()
+    """Materials to draw from, ``obstacle_kinds.MATERIALS``; the first obstacle is of the first one."""
+    obstacle_kinds: tuple[str, ...] = KIND_NAMES
+    """Kinds to draw from, ``obstacle_kinds.KIND_NAMES``."""
+    first_kinds: tuple[str, ...] = ()
+    """Kinds of the first obstacle; none: any of ``obstacle_kinds``."""
     obstacle_count: tuple[int, int] = (0, 0)
-    """Smallest and largest number of obstacles, inclusive."""
+    """Smallest and largest number of obstacles that stand still, inclusive."""
+    free_elevation_deg: tuple[float, float] = (40.0, 85.0)
+    """Range of the elevation of the way that is left free, deg."""
+    moving_count: tuple[int, int] = (0, 0)
+    """Smallest and largest number of obstacles that move, inclusive."""
     alpha: tuple[float, float] = (0.3, 0.7)
     """Range of the opacity of see-through obstacles."""
     target_shapes: tuple[str, ...] = tuple(shape.name for shape in TARGET_SHAPES)
     grasp_width: tuple[float, float] = (0.025, 0.07)
     """Range of the target's width between the fingers, m."""
-    view_elevation_deg: tuple[float, float] = (40.0, 52.0)
+    view_elevation_deg: tuple[float, float] = (40.0, 55.0)
     """Range of the angle by which the camera first looks down at the target, deg."""
     through_sight: bool = False
     """Whether the first line of sight to the target's centre passes through the first obstacle."""
-    obstacle_motions: tuple[str, ...] = ()
-    """Motions to draw from, one of ``OBSTACLE_MOTIONS`` for each obstacle; none: all stand still."""
+    discovery: bool = False
+    """Whether something stands in the natural way around the first obstacle and cannot be seen from the start."""
+    obstacle_motions: tuple[str, ...] = OBSTACLE_MOTIONS
+    """Motions to draw from, one of ``OBSTACLE_MOTIONS`` for each obstacle that moves."""
     drive_speed: tuple[float, float] = (0.03, 0.10)
     """Range of the speed of driven obstacles, m/s."""
     obstacle_push: tuple[float, float] = (0.04, 0.10)
@@ -57,20 +70,23 @@ class Scenario:
     """Probability that the target is pushed."""
     distractor: float = 0.0
     """Probability of a second object of the target's colour, which stays in its place."""
-    screen: bool = False
-    """Whether the one obstacle is a glass screen close to the target: in half of the scenes a low one in front of it,
-    which bars low ways, in the others a high one behind it, which bars ways from above."""
     coloured_frames: bool = False
     """Whether frames and rims are of colours drawn anew for each obstacle, instead of one dark grey. Nothing else of a
     scene differs."""
 
     def __post_init__(self) -> None:
-        _require_names("obstacle_kinds", self.obstacle_kinds, OBSTACLE_KINDS)
+        _require_names("obstacle_materials", self.obstacle_materials, MATERIALS)
+        _require_names("obstacle_kinds", self.obstacle_kinds, KIND_NAMES)
+        _require_names("first_kinds", self.first_kinds, KIND_NAMES)
         _require_names("target_shapes", self.target_shapes, tuple(shape.name for shape in TARGET_SHAPES))
-        _require_range("obstacle_count", self.obstacle_count, 0, MAX_OBSTACLES)
+        for name in ("obstacle_count", "moving_count"):
+            _require_range(name, getattr(self, name), 0, MAX_OBSTACLES)
+            if not all(isinstance(count, int) for count in getattr(self, name)):
+                raise ValueError(f"{name} must be two whole numbers, got {getattr(self, name)}")
         _require_range("grasp_width", self.grasp_width, 0.025, 0.07)
         _require_range("alpha", self.alpha, 0.0, 1.0)
-        _require_range("view_elevation_deg", self.view_elevation_deg, 25.0, 60.0)
+        _require_range("free_elevation_deg", self.free_elevation_deg, 40.0, 85.0)
+        _require_range("view_elevation_deg", self.view_elevation_deg, 30.0, 60.0)
         _require_names("obstacle_motions", self.obstacle_motions, OBSTACLE_MOTIONS)
         _require_range("drive_speed", self.drive_speed, 0.01, 0.10)
         _require_range("obstacle_push", self.obstacle_push, 0.0, 0.10)
@@ -78,20 +94,28 @@ class Scenario:
         _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
         _require_probability("target_moves", self.target_moves)
         _require_probability("distractor", self.distractor)
-        for name in ("screen", "coloured_frames"):
+        for name in ("through_sight", "discovery", "coloured_frames"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"{name} must be true or false, got {getattr(self, name)!r}")
-        if self.screen and self.obstacle_count != (0, 0):
-            raise ValueError(f"screen stands alone: obstacle_count must be (0, 0), got {self.obstacle_count}")
-        high = self.obstacle_count[1]
-        if not all(isinstance(count, int) for count in self.obstacle_count):
-            raise ValueError(f"obstacle_count must be two whole numbers, got {self.obstacle_count}")
-        if high > 1 and set(self.obstacle_kinds) == {"mirror"}:
-            raise ValueError(f"obstacle_count may be at most 1 with mirrors alone, got {self.obstacle_count}")
-        if high > 0 and not self.obstacle_kinds:
-            raise ValueError(f"obstacle_count {self.obstacle_count} needs obstacle_kinds from {OBSTACLE_KINDS}")
+        self._check_obstacles()
+
+    def _check_obstacles(self) -> None:
+        """Check that fields fit together."""
         if not self.target_shapes:
             raise ValueError("target_shapes must name at least one shape")
+        still, moving = self.obstacle_count, self.moving_count
+        if still[1] + moving[1] > MAX_OBSTACLES:
+            raise ValueError(f"obstacle_count and moving_count may add up to {MAX_OBSTACLES}, got {still} and {moving}")
+        if still[1] + moving[1] == 0:
+            return
+        if not self.obstacle_materials or not self.obstacle_kinds:
+            raise ValueError(f"obstacle_count {still} needs obstacle_materials and obstacle_kinds to draw from")
+        if moving[1] and not self.obstacle_motions:
+            raise ValueError(f"moving_count {moving} needs obstacle_motions from {list(OBSTACLE_MOTIONS)}")
+        if set(self.obstacle_materials) == {"mirror"} and still[1] + moving[1] > 1:
+            raise ValueError("obstacle_materials of mirrors alone allow one obstacle; add another material")
+        if (self.through_sight or self.discovery) and still[0] < 1:
+            raise ValueError("through_sight and discovery need an obstacle_count of 1 or more")
 
 
 def _require_names(field: str, names: tuple[str, ...], allowed: tuple[str, ...]) -> None:
@@ -116,27 +140,63 @@ def _require_probability(field: str, value: float) -> None:
         raise ValueError(f"{field} must be a number within 0..1, got {value!r}")
 
 
+_UPRIGHT = ("thing", "wall", "leaning_board")
+_SCREEN = Scenario(
+    "screen",
+    ("translucent",),
+    obstacle_kinds=("wall", "leaning_board", "roof", "niche"),
+    obstacle_count=(2, 5),
+)
+
 SCENARIOS: dict[str, Scenario] = {
     scenario.name: scenario
     for scenario in (
         Scenario("clear"),
-        Scenario("opaque", ("opaque",), (1, 3)),
-        Scenario("translucent", ("translucent",), (2, 3)),
-        Scenario("mirror", ("mirror",), (1, 1)),
-        Scenario("line_of_sight", ("translucent", "wire"), (1, 2), view_elevation_deg=(28.0, 38.0), through_sight=True),
-        Scenario("moving_obstacle", ("opaque", "translucent"), (1, 2), obstacle_motions=("driven", "pushed")),
+        Scenario("opaque", ("opaque",), obstacle_count=(2, 6)),
+        Scenario("translucent", ("translucent",), obstacle_count=(2, 6)),
+        Scenario("mirror", ("mirror", "opaque"), obstacle_count=(2, 6)),
+        Scenario(
+            "line_of_sight",
+            ("translucent", "wire"),
+            first_kinds=_UPRIGHT,
+            obstacle_count=(2, 6),
+            through_sight=True,
+        ),
+        Scenario("moving_obstacle", ("opaque", "translucent"), obstacle_count=(2, 5), moving_count=(1, 2)),
         Scenario("moving_target", target_moves=1.0),
         Scenario("distractor", distractor=1.0),
         Scenario(
             "mixed",
-            OBSTACLE_KINDS,
-            (1, 4),
-            obstacle_motions=("still", "still", "driven", "pushed"),
+            MATERIALS,
+            obstacle_count=(2, 6),
+            moving_count=(0, 1),
             target_moves=0.3,
             distractor=0.3,
         ),
-        Scenario("screen", screen=True),
-        Scenario("screen_coloured", screen=True, coloured_frames=True),
+        _SCREEN,
+        replace(_SCREEN, name="screen_coloured", coloured_frames=True),
+        Scenario(
+            "shelf",
+            ("opaque", "translucent", "wire"),
+            first_kinds=("cabinet", "shelf", "roof"),
+            obstacle_count=(2, 6),
+            free_elevation_deg=(40.0, 58.0),
+        ),
+        Scenario(
+            "bin",
+            ("opaque", "translucent", "wire"),
+            first_kinds=("bin",),
+            obstacle_count=(2, 6),
+            free_elevation_deg=(60.0, 85.0),
+        ),
+        Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
+        Scenario(
+            "discovery",
+            ("mirror", "opaque"),
+            first_kinds=("wall", "thing"),
+            obstacle_count=(2, 6),
+            discovery=True,
+        ),
     )
 }
 SCENARIO_NAMES = tuple(SCENARIOS)

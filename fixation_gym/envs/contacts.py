@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's functions have no type stubs.)
-"""Whether the robot touches an obstacle, and how near it came."""
+"""Whether the robot hits an obstacle or the table, and how near it came."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fixation_gym.envs.config import COLLISION_FORCE
+from fixation_gym.envs.config import COLLISION_FORCE, TABLE_FORCE
 from fixation_gym.types import FloatArray
 
-OTHER, ROBOT, OBSTACLE = 0, 1, 2
-"""Owners of geoms."""
+OTHER, ROBOT, OBSTACLE, TABLE = 0, 1, 2, 3
+"""Owners of geoms. The whole arm is the robot; a red object that is not the target is an obstacle, too."""
+_TABLE_BODY = "table"
 LARGEST_CLEARANCE = 0.5
 """Distances are not measured beyond this, m; it is also the clearance of a scene without obstacles."""
 
@@ -29,31 +30,39 @@ def geom_owners(model: Any, robot_bodies: tuple[str, ...]) -> Owners:
         body = model.body(model.geom_bodyid[geom]).name
         if body.startswith(robot_bodies):
             owners[geom] = ROBOT
-        elif body.startswith("obstacle"):
+        elif body.startswith(("obstacle", "distractor")):
             owners[geom] = OBSTACLE
+        elif body == _TABLE_BODY:
+            owners[geom] = TABLE
     return owners
 
 
-def robot_hits_obstacle(model: Any, data: Any, owners: Owners) -> bool:
-    """Whether a robot-obstacle contact carries more than ``COLLISION_FORCE``."""
+def robot_hits(model: Any, data: Any, owners: Owners) -> bool:
+    """Whether a contact of the robot carries more than ``COLLISION_FORCE`` to an obstacle, ``TABLE_FORCE`` to the table.
+
+    The fingers may touch the table lightly: a thing that lies flat is grasped there.
+    """
     if data.ncon == 0:
         return False
     geoms = data.contact.geom
     if not _any_touch(geoms, owners):
         return False
     force = np.zeros(6)
-    for contact in np.flatnonzero(owners[geoms].prod(axis=1) == ROBOT * OBSTACLE):
+    pairs = owners[geoms].prod(axis=1)
+    for contact in np.flatnonzero((pairs == ROBOT * OBSTACLE) | (pairs == ROBOT * TABLE)):
         mujoco.mj_contactForce(model, data, int(contact), force)
-        if np.linalg.norm(force[:3]) > COLLISION_FORCE:
+        limit = COLLISION_FORCE if pairs[contact] == ROBOT * OBSTACLE else TABLE_FORCE
+        if np.linalg.norm(force[:3]) > limit:
             return True
     return False
 
 
 @njit(cache=True)
 def _any_touch(geoms: Owners, owners: Owners) -> bool:
-    """Whether one of the pairs of geoms, shape (n, 2), is of robot and obstacle; asked at every physics substep."""
-    for pair in range(len(geoms)):  # noqa: SIM110 - compiled
-        if owners[geoms[pair, 0]] * owners[geoms[pair, 1]] == ROBOT * OBSTACLE:
+    """Whether one of the pairs of geoms, (n, 2), is of robot and obstacle or table; asked at every physics substep."""
+    for pair in range(len(geoms)):
+        product = owners[geoms[pair, 0]] * owners[geoms[pair, 1]]
+        if product == ROBOT * OBSTACLE or product == ROBOT * TABLE:
             return True
     return False
 

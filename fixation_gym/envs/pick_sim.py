@@ -166,7 +166,7 @@ class PickSim:
             exposure_substep: substep after which the image is taken.
 
         Returns:
-            qpos at the exposure, and whether the robot hit an obstacle.
+            qpos at the exposure, and whether the robot hit an obstacle or the table.
         """
         model, data = self.model, self.data
         finger_step = _GRIPPER_SPEED * model.opt.timestep * float(np.sign(gripper))
@@ -183,8 +183,8 @@ class PickSim:
                 finger = min(max(finger - finger_step, 0.0), 0.04)
                 fingers[:] = finger, -finger
             mujoco.mj_step2(model, data)
-            if self.obstacles and not collided:
-                collided = contacts.robot_hits_obstacle(model, data, self._compiled.owners)
+            if not collided:
+                collided = contacts.robot_hits(model, data, self._compiled.owners)
             if substep == exposure_substep:
                 exposed = data.qpos.copy()
         mujoco.mj_kinematics(model, data)
@@ -224,8 +224,8 @@ class PickSim:
         return float(self.body_position("target")[2] - self._rest["target"][2])
 
     def obstacle_push(self) -> float:
-        """Largest distance of an obstacle from where it would be without the robot, m."""
-        return max((self._deviation(body) for body in self.obstacles), default=0.0)
+        """Largest distance of an obstacle or the distractor from where it would be without the robot, m."""
+        return max((self._deviation(body) for body in self._rest if body != "target"), default=0.0)
 
     def _deviation(self, body: str) -> float:
         """Distance of a pool body from its place at reset or, if the scene moves it, from its planned one, m."""

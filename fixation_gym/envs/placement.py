@@ -1,106 +1,124 @@
-"""Where obstacles stand and how they move: what ``sampling`` draws, and the room they need."""
+"""One obstacle at a time: where it stands and how it moves, so that it bars a way, and the room it needs."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
+from fixation_gym.control.corridor import BoxSet, any_meets, any_pair_meets, swept_hand
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.motion import Motion
-from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, obstacle_shape
+from fixation_gym.envs.obstacle_kinds import ObstacleKind, kinds_of
 from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
+from fixation_gym.envs.shapes import centred
 from fixation_gym.types import FloatArray
 
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
 _PUSH_SPEED = 0.15
 """Speed of pushes, m/s."""
-_SCREEN_GAPS = {"low": (0.100, 0.115), "high": (0.060, 0.075)}
-"""Ranges of the distance between the target's centre and a low screen in front, or a high one behind it, m."""
-_SCREEN_AZIMUTH = math.radians(45.0)
-"""Of the middle of the directions from which the arm comes, against the direction from base to target, rad."""
-_SCREEN_TURN = 0.2
-"""Largest angle between that direction and the normal of the screen, rad."""
 _DRIVE_LENGTH = (0.08, 0.16)
 """Range of the length of a driven obstacle's way, m."""
-_TURN = 0.5
-"""Largest angle between the way of an obstacle across the line of sight and the normal to that line, rad."""
+_MOVER_DISTANCE = (0.15, 0.27)
+"""Range of the distance between the target and a moving obstacle, m."""
+_DENSITY = 250.0
+"""Of what obstacles are made of, kg/m^3; light wood with hollow parts."""
+_LEAST_MASS, _LARGEST_MASS = 0.3, 1.5
+_ORBIT = 0.37
+"""What is seen from the target above a slope of ``_FLAT`` stays this near to it, m: the hand can go around farther out."""
+_FLAT = 0.5
+_TABLE = ((0.24, 0.90), (-0.36, 0.36))
+"""Ranges of x and y of the table top on which things stand, in base, m."""
+_TARGET_GAP, OBSTACLE_GAP = 0.012, 0.006
+"""Least room between an obstacle and red things, and between obstacles, m."""
+FREE_ROOM = 0.01
+"""Room around the hand on the free ways, m."""
+_START_ROOM = 0.04
+"""Least distance between the hand and obstacles at the start, m."""
 
 
-def sample_obstacle(
-    scenario: Scenario, kind: str, centre: FloatArray, camera: FloatArray, across: bool, rng: np.random.Generator
-) -> ObstacleSpec | None:
-    """Draw one obstacle of that kind.
+def draw_kind(
+    scenario: Scenario, first: bool, steepness: float, rng: np.random.Generator
+) -> tuple[ObstacleKind, str] | None:
+    """Draw a kind and a material for the next obstacle; None if there is none.
 
     Args:
-        scenario: with the ranges.
-        kind: one of ``OBSTACLE_KINDS``.
-        centre: of the target, shape (3,), in base, m.
-        camera: its first position, shape (3,), in base, m.
-        across: place it at the first line of sight instead of anywhere around the target.
+        scenario: with what may be drawn.
+        first: whether it is the first obstacle: it may stand around the target, and shows the scenario's material.
+        steepness: sine of the elevation in which it is to be seen from the target, 0..1.
         rng: generator.
-
-    Returns:
-        None if it had to stand in the line of sight and does not.
     """
-    shapes = OBSTACLE_SHAPES[kind]
-    shape = shapes[int(rng.integers(len(shapes)))]
-    scale = float(rng.uniform(0.8, 1.0))
-    to_camera = math.atan2(camera[1] - centre[1], camera[0] - centre[0])
-    if across:
-        angle, radius = to_camera, rng.uniform(*((0.17, 0.24) if scenario.through_sight else (0.13, 0.20)))
-        side = _sideways_offset(kind, shape, scale, rng)
-    else:
-        angle, radius = to_camera + rng.uniform(-2.8, 2.8), rng.uniform(0.17, 0.28)
-        side = 0.0
-    radial, lateral = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
-    x, y = centre[:2] + radius * radial + side * lateral
-    yaw = to_camera + rng.uniform(-0.35, 0.35) if kind in ("mirror", "translucent") else rng.uniform(-math.pi, math.pi)
-    tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
-    obstacle = ObstacleSpec(
-        kind=kind,
-        shape=shape.name,
-        scale=scale,
-        position=(float(x), float(y), float(TABLE_HEIGHT + shape.half_extent[2] * scale)),
-        yaw=float(yaw),
-        rgba=(float(tint[0]), float(tint[1]), float(tint[2]), float(rng.uniform(*scenario.alpha))),
-        texture=str(rng.choice(OBSTACLE_TEXTURES)),
-        has_label=bool(rng.random() < 0.7),
-    )
-    if across and scenario.through_sight and not _passes_through(obstacle, camera, centre):
-        return None
-    if scenario.obstacle_motions:
-        obstacle = _set_moving(obstacle, scenario, angle, across, rng)
-    return obstacle
+    materials = scenario.obstacle_materials
+    material = materials[0] if first else str(rng.choice(materials))
+    names = (scenario.first_kinds if first else ()) or scenario.obstacle_kinds
+    kinds = [kind for kind in kinds_of(material) if kind.name in names and (first or not kind.around)]
+    suitable = [kind for kind in kinds if kind.around or kind.steepness[0] <= steepness <= kind.steepness[1]]
+    return (suitable[int(rng.integers(len(suitable)))], material) if suitable else None
 
 
-def sample_screen(scenario: Scenario, name: str, centre: FloatArray, rng: np.random.Generator) -> ObstacleSpec:
-    """Draw a screen close to the target, as seen from where the arm comes.
+def draw_obstacle(
+    kind: ObstacleKind,
+    material: str,
+    target: FloatArray,
+    bearing: float,
+    distance: float,
+    scenario: Scenario,
+    rng: np.random.Generator,
+) -> ObstacleSpec:
+    """Draw an obstacle.
 
     Args:
+        kind: what it is.
+        material: of it.
+        target: centre of the target, shape (3,), in base, m.
+        bearing: azimuth of a way of the hand, in base, rad: the obstacle stands below it or, if it stands around the
+            target, opens towards it.
+        distance: between its place and the target, horizontal, m.
         scenario: with the range of the opacity.
-        name: "low", in front of the target, or "high", behind it.
-        centre: of the target, shape (3,), in base, m.
         rng: generator.
     """
-    shape = obstacle_shape("screen", name)
-    beyond = math.atan2(centre[1], centre[0]) + _SCREEN_AZIMUTH + rng.uniform(-_SCREEN_TURN, _SCREEN_TURN)
-    bearing = beyond if name == "high" else beyond + math.pi
-    radius, side = rng.uniform(*_SCREEN_GAPS[name]) + shape.half_extent[0], rng.uniform(-0.03, 0.03)
-    x = centre[0] + radius * math.cos(bearing) - side * math.sin(bearing)
-    y = centre[1] + radius * math.sin(bearing) + side * math.cos(bearing)
+    anchor = target[:2] - distance * np.array([math.cos(bearing), math.sin(bearing)])
+    facing = bearing + rng.uniform(-0.4, 0.4) + (math.pi if kind.around else 0.0)
+    parts = kind.draw(material, rng)
+    shape, origin = centred(kind.name, parts, 1.0)
+    volume = sum(part.density * 8.0 * math.prod(part.size) for part in parts)
+    shape = replace(shape, mass=min(max(_DENSITY * volume, _LEAST_MASS), _LARGEST_MASS))
+    c, s = math.cos(facing), math.sin(facing)
+    x, y = anchor + [c * origin[0] - s * origin[1], s * origin[0] + c * origin[1]]
     tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
     return ObstacleSpec(
-        kind="screen",
-        shape=name,
-        scale=1.0,
+        kind=material,
+        shape=shape,
         position=(float(x), float(y), TABLE_HEIGHT + shape.half_extent[2]),
-        yaw=float(bearing + math.pi),
+        yaw=float(facing),
         rgba=(float(tint[0]), float(tint[1]), float(tint[2]), float(rng.uniform(*scenario.alpha))),
-        texture=OBSTACLE_TEXTURES[0],
-        has_label=False,
+        texture=str(rng.choice(OBSTACLE_TEXTURES)),
     )
+
+
+def moved_out(obstacle: ObstacleSpec, bearing: float, distance: float) -> ObstacleSpec:
+    """The obstacle farther out by ``distance`` m on the side from which a way with that azimuth comes."""
+    x, y, z = obstacle.position
+    return replace(obstacle, position=(x - distance * math.cos(bearing), y - distance * math.sin(bearing), z))
+
+
+def draw_mover(
+    scenario: Scenario, kind: ObstacleKind, material: str, target: FloatArray, rng: np.random.Generator
+) -> ObstacleSpec:
+    """Draw a thing that moves about somewhere near the target."""
+    bearing = float(rng.uniform(-math.pi, math.pi))
+    still = draw_obstacle(kind, material, target, bearing, rng.uniform(*_MOVER_DISTANCE), scenario, rng)
+    heading = float(rng.uniform(-math.pi, math.pi))
+    if str(rng.choice(scenario.obstacle_motions)) == "driven":
+        length = rng.uniform(*_DRIVE_LENGTH)
+        displacement = (float(length * math.cos(heading)), float(length * math.sin(heading)))
+        motion = Motion(0.0, displacement, float(rng.uniform(*scenario.drive_speed)), to_and_fro=True)
+    else:
+        motion = sample_push(scenario.obstacle_push, scenario.push_time, heading, rng)
+    x, y = np.array(still.position[:2]) - rng.uniform(0.0, 1.0) * np.array(motion.displacement)
+    return replace(still, position=(float(x), float(y), still.position[2]), motion=motion)
 
 
 def sample_push(
@@ -112,84 +130,85 @@ def sample_push(
     return Motion(float(rng.uniform(*start)), displacement, _PUSH_SPEED)
 
 
-def has_room(obstacle: ObstacleSpec, reds: FloatArray, others: list[ObstacleSpec]) -> bool:
-    """Whether the obstacle always stays on the table, apart from red objects and from the other obstacles.
+@dataclass(frozen=True, eq=False)
+class Room:
+    """What an obstacle must keep clear of."""
 
-    Args:
-        obstacle: the new one.
-        reds: all places of target and distractor, shape (n, 3), in base, m.
-        others: obstacles that are there already.
-    """
-    ways, radius = _discs(obstacle)
-    if not np.all((ways[:, 0] > 0.24) & (ways[:, 0] < 0.90) & (np.abs(ways[:, 1]) < 0.35)):
-        return False
-    if _nearest(ways, reds[:, :2]) < radius + 0.055:
-        return False
-    taken = [_discs(other) for other in others]
-    return all(_nearest(ways, places) > radius + other_radius + 0.01 for places, other_radius in taken)
+    reds: BoxSet
+    """Boxes around target and distractor at all their places; the target's is the first."""
+    hand: BoxSet
+    """Boxes around the hand at the start."""
+    ends: FloatArray
+    """Where the target is at first and in the end, shape (n, 3), in base, m."""
+    ways: FloatArray
+    """Axes of the hand, as in ``corridor.hand_axes``, on the ways to it that stay free, shape (m, 3, 3)."""
 
+    def first_place(self, boxes: BoxSet, step: FloatArray, most: int) -> int | None:
+        """Number of steps after which an obstacle has room; None if it never has.
 
-def _set_moving(
-    obstacle: ObstacleSpec, scenario: Scenario, angle: float, across: bool, rng: np.random.Generator
-) -> ObstacleSpec:
-    """Give the obstacle a motion; ``angle`` is that from the target to it, in base, rad.
+        Args:
+            boxes: of the obstacle's parts at all its places.
+            step: by which it is moved, shape (3,), m.
+            most: largest number of steps.
+        """
+        centres, halves = swept_hand(FREE_ROOM)
+        steps = _first_place(*boxes, step, most, self.reds, self.hand, self.ends, self.ways, centres, halves)
+        return None if steps < 0 else int(steps)
 
-    An obstacle across the line of sight moves across it and back again, the drawn place being on the way; others are
-    driven anywhere. A pushed one is at the drawn place before or after the push.
-    """
-    name = str(rng.choice(scenario.obstacle_motions))
-    if name == "still":
-        return obstacle
-    side = float(rng.choice((-1.0, 1.0))) * math.pi / 2.0
-    heading = angle + side + rng.uniform(-_TURN, _TURN) if across else rng.uniform(-math.pi, math.pi)
-    if name == "driven":
-        length = rng.uniform(*_DRIVE_LENGTH)
-        displacement = (float(length * math.cos(heading)), float(length * math.sin(heading)))
-        motion = Motion(0.0, displacement, float(rng.uniform(*scenario.drive_speed)), to_and_fro=True)
-        share = rng.uniform(0.3, 0.7)
-    else:
-        motion = sample_push(scenario.obstacle_push, scenario.push_time, heading, rng)
-        share = float(rng.choice((0.0, 1.0)))
-    x, y = np.array(obstacle.position[:2]) - share * np.array(motion.displacement)
-    return replace(obstacle, position=(float(x), float(y), obstacle.position[2]), motion=motion)
+    def holds(self, boxes: BoxSet) -> bool:
+        """Whether an obstacle has room where it is."""
+        return self.first_place(boxes, np.zeros(3), 0) == 0
 
 
-def _sideways_offset(kind: str, shape: Shape, scale: float, rng: np.random.Generator) -> float:
-    """Distance of the obstacle's axis from the line of sight, m.
-
-    What can be seen through stands right across it. What cannot stands beside it, close enough to be hit by the
-    hand, so that the target is in view from the start.
-    """
-    if kind in ("translucent", "wire"):
-        return float(rng.uniform(-0.03, 0.03))
-    half_width = max(shape.half_extent[:2]) * scale
-    return float(rng.choice((-1.0, 1.0)) * (half_width + rng.uniform(0.0, 0.035)))
-
-
-def _passes_through(obstacle: ObstacleSpec, camera: FloatArray, centre: FloatArray) -> bool:
-    """Whether the line from camera to target passes through the inner part of the obstacle's box."""
-    box = obstacle.box
-    c, s = math.cos(box.yaw), math.sin(box.yaw)
-    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    begin, end = turn @ (camera - box.centre), turn @ (centre - box.centre)
-    points = begin + np.linspace(0.0, 1.0, 200)[:, None] * (end - begin)
-    return bool(np.any(np.all(np.abs(points) < 0.85 * box.half_extent, axis=1)))
-
-
-def _discs(obstacle: ObstacleSpec) -> tuple[FloatArray, float]:
-    """Discs that cover the footprint at all places on its way: centres in base, shape (n, 2), and radius, m.
-
-    A screen is far wider than deep and takes several; one is enough for everything else.
-    """
-    centres = np.array([box.centre[:2] for box in obstacle.boxes])
-    half_x, half_y, _ = np.array(obstacle_shape(obstacle.kind, obstacle.shape).half_extent) * obstacle.scale
-    if obstacle.kind != "screen":
-        return centres, math.hypot(half_x, half_y)
-    count = 5
-    along = np.linspace(-1.0, 1.0, count)[:, None] * half_y * (1.0 - 1.0 / count)
-    return centres + along * (-math.sin(obstacle.yaw), math.cos(obstacle.yaw)), math.hypot(half_x, half_y / count)
+@njit(cache=True)
+def _first_place(
+    places: FloatArray,
+    turns: FloatArray,
+    halves: FloatArray,
+    step: FloatArray,
+    most: int,
+    reds: BoxSet,
+    hand: BoxSet,
+    ends: FloatArray,
+    ways: FloatArray,
+    swept: FloatArray,
+    swept_halves: FloatArray,
+) -> int:
+    """The compiled part of ``Room.first_place``; -1: none."""
+    for count in range(most + 1):
+        centres = places + count * step
+        if not _within_bounds(centres, turns, halves, reds[0][0]):
+            continue
+        if any_pair_meets(centres, turns, halves + _TARGET_GAP, reds[0], reds[1], reds[2]):
+            continue
+        if any_pair_meets(centres, turns, halves + _START_ROOM, hand[0], hand[1], hand[2]):
+            continue
+        free = True
+        for end in range(len(ends)):
+            if free and np.any(any_meets(ends[end], ways, centres, turns, halves, swept, swept_halves)):
+                free = False
+        if free:
+            return count
+    return -1
 
 
-def _nearest(first: FloatArray, second: FloatArray) -> float:
-    """Smallest distance between points, shapes (n, 2) and (m, 2), m."""
-    return float(np.min(np.linalg.norm(first[:, None] - second[None], axis=-1)))
+@njit(cache=True)
+def _within_bounds(centres: FloatArray, rotations: FloatArray, halves: FloatArray, target: FloatArray) -> bool:
+    """Whether boxes are above the table, and within ``_ORBIT`` of the target if the hand might meet them there."""
+    for i in range(len(centres)):
+        low, high = centres[i].copy(), centres[i].copy()
+        for axis in range(3):
+            reach = 0.0
+            for k in range(3):
+                reach += abs(rotations[i, axis, k]) * halves[i, k]
+            low[axis] -= reach
+            high[axis] += reach
+        for axis in range(2):
+            if low[axis] < _TABLE[axis][0] or high[axis] > _TABLE[axis][1]:
+                return False
+        x = max(abs(low[0] - target[0]), abs(high[0] - target[0]))
+        y = max(abs(low[1] - target[1]), abs(high[1] - target[1]))
+        across, rise = math.hypot(x, y), high[2] - target[2]
+        if rise > _FLAT * across and math.hypot(across, rise) > _ORBIT:
+            return False
+    return True

@@ -1,181 +1,204 @@
-"""Sampling of scenes: something hinders the straight approach, or that from above, yet some approach is free.
+"""Sampling of scenes: the free way is drawn first, then obstacles are placed until all other ways are barred.
 
-Pure: one generator in, one value out. A scene is proposed part by part and rejected as a whole, so every part is drawn
-as if the others were not there.
+A way is straight, level and comes from some direction of the arm's reach. The free one is drawn evenly over the reach,
+so no habit can know it; a cone around it stays free with room to spare, whatever moves. Obstacles are then drawn one
+by one, each to bar a way that is still open: first the one along the first line of sight, then the one from straight
+above, then any. Pure: one generator in, one value out.
 """
 
 from __future__ import annotations
 
 import colorsys
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fixation_gym.control.corridor import Box, approach_directions, free_directions
-from fixation_gym.envs.config import Scenario
-from fixation_gym.envs.object_pool import Vector, target_shape
-from fixation_gym.envs.placement import has_room, sample_obstacle, sample_push, sample_screen
-from fixation_gym.envs.scene import (
-    APPROACH_AZIMUTHS,
-    TABLE_HEIGHT,
-    TARGET_REGION,
-    ObstacleSpec,
-    SceneSpec,
-    TargetSpec,
-    reachable_directions,
+from fixation_gym.control.corridor import (
+    BoxSet,
+    approach_directions,
+    box_set,
+    boxes_meet,
+    free_directions,
+    hand_axes,
+    hand_boxes,
 )
+from fixation_gym.envs.config import Scenario
+from fixation_gym.envs.object_pool import MAX_OBSTACLES, target_shape
+from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS
+from fixation_gym.envs.placement import (
+    FREE_ROOM,
+    OBSTACLE_GAP,
+    Room,
+    draw_kind,
+    draw_mover,
+    draw_obstacle,
+    moved_out,
+    sample_push,
+)
+from fixation_gym.envs.pool_slots import fits_pool
+from fixation_gym.envs.reach import REACH_GRID, reachable_directions, sample_direction
+from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, ObstacleSpec, SceneSpec, TargetSpec
+from fixation_gym.envs.shapes import Vector
+from fixation_gym.envs.visibility import is_seen, passes_through, visible_share
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.robot import TOOL_IN_CAMERA
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, MaskArray
 
 _PUSHED_REGION = ((0.46, 0.66), (-0.18, 0.18))
-"""Ranges of x and y in which a push may leave it, in base, m."""
-_CLEARANCE = 0.015
-_LEAST_FREE = 0.2
-"""Least share of the reachable directions that must be free with ``_CLEARANCE`` m to spare; with a screen, of those of
-the kind that it does not bar, with nothing to spare."""
-_CLIMBS = np.radians([0.0, 5.0, 10.0, 15.0])
-"""Rises of the hand on its way, as servo policies climb, along all of which the straight approach must be hindered."""
-_LOW, _STEEP = np.radians([45.0, 50.0, 55.0]), np.radians([75.0, 79.0, 83.0])
-"""Elevations of low ways and of those from above: a screen must bar all of one kind and leave some of the other."""
+"""Ranges of x and y in which a push may leave the target, in base, m."""
+_BARRED_DEPTH = 0.01
+"""A way is barred if a hand smaller by this would still touch something, m."""
+_CONE = math.radians(5.0)
+"""Half angle of the cone of free ways, rad."""
+_NEAR_FREE = math.radians(12.0)
+"""Ways this near to the free one need not be barred, rad."""
+_MOST_OPEN = 0.28
+"""Largest share of the reach that is not barred in the end."""
+_ABOVE = math.radians(75.0)
+"""Ways from above are those of at least this elevation, rad."""
+_MOST_ABOVE = 0.35
+"""Largest share of them that is not barred, unless the free way is one of them."""
+_BEYOND = (0.2, 0.9)
+"""Range of the angle by which an obstacle stands beyond the way that it is to bar, seen from the free one, rad."""
+_STEP_OUT = 0.02
+"""An obstacle that is in the free way is moved out by this much at a time, m."""
+_LEAST_VISIBLE = 0.5
+"""Least share of the target that is in view at the start, through glass or past everything else."""
+_LARGEST_ROLL, _LOW_ROLL = math.radians(45.0), math.radians(20.0)
+"""Largest turn of the hand that a grasp may need on a steep free way and on a low one, rad."""
 _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
 _FRAME_HUES = (1.0 / 8.0, 7.0 / 8.0)
 """Range of the hue of coloured frames, 0..1: anything but the target's red."""
-_START_ROOM = 0.10
-"""Least distance between the point between the finger tips and obstacles at the start, m; half the hand is 5 cm."""
-_ATTEMPTS = 1000
+_APART = math.radians(20.0)
+"""Least angle between the first line of sight and the free way: the hand is wide, and the former is to be barred."""
+_ATTEMPTS, _ATTEMPTS_EACH, _BATCHES, _MOVER_TRIES = 10, 60, (40, 20), 40
+"""Free ways and scenes for each that are tried, candidates for the obstacles of one scene, drawn in turns, and tries for those that move."""
+_THING = OBSTACLE_KINDS[0]
 
 
 def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
-    """Draw a scene in which something hinders the straight approach, yet some approach is free all the time.
-
-    With a high screen it is the approach from above that is hindered.
+    """Draw a scene with a free way that cannot be guessed.
 
     Raises:
-        RuntimeError: if the scenario's sizes leave no room for such a scene.
+        RuntimeError: if the scenario leaves no room for such a scene.
     """
-    screen = str(rng.choice(("low", "high"))) if scenario.screen else None
+    low, high = (math.radians(angle) for angle in scenario.free_elevation_deg)
     for _ in range(_ATTEMPTS):
-        scene = _propose(scenario, screen, rng)
-        if scene is not None:
-            return scene
+        free = sample_direction(rng, (low, high))
+        # The same way is tried again, or those that are easily left free would come up more often.
+        for _ in range(_ATTEMPTS_EACH):
+            scene = _propose(scenario, free, rng)
+            if scene is not None:
+                return scene
     raise RuntimeError(
-        f"no solvable scene found in {_ATTEMPTS} draws for scenario {scenario.name!r}; use fewer obstacles"
+        f"no scene of scenario {scenario.name!r} found in {_ATTEMPTS * _ATTEMPTS_EACH} draws; allow more obstacles, more kinds of them, "
+        "or another range of free_elevation_deg"
     )
 
 
-def _propose(scenario: Scenario, screen: str | None, rng: np.random.Generator) -> SceneSpec | None:
+@dataclass(frozen=True)
+class Way:
+    """A way of the hand to the target: from where it comes."""
+
+    azimuth: float
+    """In base, rad: 0 comes from the robot's side along +x."""
+    elevation: float
+    """Above the table, rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """What is there before the obstacles."""
+
+    target: TargetSpec
+    distractor: TargetSpec | None
+    camera: FloatArray
+    gaze: FloatArray
+    view: Way
+    """Direction from the target to the camera."""
+    free: Way
+
+    room: Room
+
+    @property
+    def pose(self) -> FloatArray:
+        """T_base_cam, shape (4, 4)."""
+        return look_at(self.camera, self.gaze, np.array([0.0, 0.0, 1.0]))
+
+
+def _propose(scenario: Scenario, free: tuple[float, float], rng: np.random.Generator) -> SceneSpec | None:
+    start = _sample_start(scenario, free, rng)
+    if start is None:
+        return None
+    obstacles: tuple[ObstacleSpec, ...] = ()
+    if scenario.obstacle_count[1] + scenario.moving_count[1]:
+        barriers = _bar_ways(scenario, start, rng)
+        placed = None if barriers is None else _add_movers(scenario, start, barriers, rng)
+        if placed is None or not fits_pool(placed):
+            return None
+        obstacles = tuple(placed)
+    light = rng.uniform(-0.5, 0.5, 2)
+    scene = SceneSpec(
+        target=start.target,
+        obstacles=obstacles,
+        camera_position=_vector(start.camera),
+        gaze_point=_vector(start.gaze),
+        light_direction=(float(light[0]), float(light[1]), -1.0),
+        table_texture=str(rng.choice(("table_wood", "table_plank", "table_felt"))),
+        distractor=start.distractor,
+        free_way=(start.free.azimuth, start.free.elevation) if obstacles else None,
+    )
+    # From a generator of their own: nothing else of the scene depends on the colours.
+    return _with_coloured_frames(scene, rng.spawn(1)[0]) if scenario.coloured_frames else scene
+
+
+# -- before the obstacles ----------------------------------------------------------------------------------------------
+
+
+def _sample_start(scenario: Scenario, free_angles: tuple[float, float], rng: np.random.Generator) -> _Start | None:
+    """Draw target and first view; ``free_angles`` are the free way's azimuth against the bearing and elevation, rad."""
     target = _sample_target(scenario, rng)
-    centre = np.array(target.position)
-    camera, gaze = _sample_view(scenario, centre, rng)
     if scenario.target_moves > 0.0 and rng.random() < scenario.target_moves:
         target = _pushed(target, scenario, rng)
+    centre = np.array(target.position)
+    bearing = math.atan2(centre[1], centre[0])
+    free = Way(bearing + free_angles[0], free_angles[1])
+    target = replace(target, yaw=_grasped_yaw(target, free, rng))
+    low, high = (math.radians(angle) for angle in scenario.view_elevation_deg)
+    azimuth, elevation = sample_direction(rng, (low, high))
+    view = Way(bearing + azimuth, elevation)
+    camera = centre + rng.uniform(0.42, 0.50) * _direction(view)
+    gaze = centre + rng.uniform(-0.06, 0.06, 3) * [1.0, 1.0, 0.0]
     distractor = None
     if scenario.distractor > 0.0 and rng.random() < scenario.distractor:
         distractor = _sample_distractor(scenario, target, rng)
         if not _told_apart(target, distractor, camera, gaze):
             return None
-    obstacles = _sample_obstacles(scenario, target, distractor, camera, screen, rng)
-    if obstacles is None:
+    room = _room(target, distractor, look_at(camera, gaze, np.array([0.0, 0.0, 1.0])), free)
+    if (
+        distractor is not None
+        and not free_directions(room.ends[-1], [distractor.box], _direction(free)[None], FREE_ROOM).all()
+    ):
         return None
-    boxes = _boxes(obstacles, distractor)
-    if not (_decides(target, boxes, screen) if screen else _is_solvable(target, boxes)):
-        return None
-    if obstacles and not _has_start_room(obstacles, camera, gaze):
-        return None
-    if obstacles and not (screen or _hinders(target, obstacles, camera)):
-        return None
-    light = rng.uniform(-0.5, 0.5, 2)
-    scene = SceneSpec(
-        target=target,
-        obstacles=obstacles,
-        camera_position=_vector(camera),
-        gaze_point=_vector(gaze),
-        light_direction=(float(light[0]), float(light[1]), -1.0),
-        table_texture=str(rng.choice(("table_wood", "table_plank", "table_felt"))),
-        distractor=distractor,
-    )
-    # From a generator of their own: nothing else of the episode, its sensor noise included, depends on the colours.
-    return _with_coloured_frames(scene, rng.spawn(1)[0]) if scenario.coloured_frames else scene
+    return _Start(target, distractor, camera, gaze, view, free, room)
 
 
-# -- what a scene must be ------------------------------------------------------------------------------------------
-
-
-def _boxes(obstacles: tuple[ObstacleSpec, ...], distractor: TargetSpec | None) -> list[Box]:
-    """Boxes around all that may be hit, at all places where it ever is."""
-    boxes = [box for obstacle in obstacles for box in obstacle.boxes]
-    return boxes if distractor is None else [*boxes, distractor.box]
-
-
-def _is_solvable(target: TargetSpec, boxes: list[Box]) -> bool:
-    """Whether enough directions are free, wherever the target is."""
+def _room(target: TargetSpec, distractor: TargetSpec | None, T_base_cam: FloatArray, free: Way) -> Room:
+    """What obstacles must keep clear of: red things, the hand, a cone of free ways, its axis also for a turned hand."""
+    reds = [replace(target.box, centre=place) for place in target.places]
+    if distractor is not None:
+        reds.append(distractor.box)
+    axis = _direction(free)
+    across = np.cross(axis, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    angles = np.linspace(0.0, 2.0 * math.pi, 6, endpoint=False)[:, None]
+    rim = math.cos(_CONE) * axis + math.sin(_CONE) * (np.cos(angles) * across + np.sin(angles) * np.cross(axis, across))
+    turns = _grasp_turns(target, free)
+    ways = np.vstack([axis, rim, *[axis[None]] * len(turns)])
+    rolls = np.array([0.0] * (1 + len(rim)) + turns)
     ends = target.places[[0, -1]] if target.motion else target.places[:1]
-    return all(free_directions(end, boxes, reachable_directions(end), _CLEARANCE).mean() >= _LEAST_FREE for end in ends)
-
-
-def _hinders(target: TargetSpec, obstacles: tuple[ObstacleSpec, ...], camera: FloatArray) -> bool:
-    """Whether the way along the first line of sight is blocked in the end, also for a hand that rises on its way.
-
-    What is driven counts at the middle of its way.
-    """
-    boxes = [_lasting_box(obstacle) for obstacle in obstacles]
-    centre = target.places[-1]
-    start = camera - centre
-    azimuth, elevation = math.atan2(-start[1], -start[0]), math.atan2(start[2], math.hypot(start[0], start[1]))
-    ways = approach_directions(np.array([azimuth]), np.minimum(elevation + _CLIMBS, math.radians(80.0)))
-    return not free_directions(centre, boxes, ways, 0.0).any()
-
-
-def _decides(target: TargetSpec, boxes: list[Box], screen: str) -> bool:
-    """Whether a low screen bars all low ways and leaves some from above, or a high one the other way round."""
-    bearing = math.atan2(target.position[1], target.position[0])
-    barred, left = (_LOW, _STEEP) if screen == "low" else (_STEEP, _LOW)
-    for place in target.places[[0, -1]]:
-        if free_directions(place, boxes, approach_directions(bearing + APPROACH_AZIMUTHS, barred), 0.0).any():
-            return False
-        ways = approach_directions(bearing + APPROACH_AZIMUTHS, left)
-        if free_directions(place, boxes, ways, 0.0).mean() < _LEAST_FREE:
-            return False
-    return True
-
-
-def _has_start_room(obstacles: tuple[ObstacleSpec, ...], camera: FloatArray, gaze: FloatArray) -> bool:
-    """Whether the finger tips, while the hand looks around where it starts, are apart from all places of obstacles."""
-    pose = look_at(camera, gaze, np.array([0.0, 0.0, 1.0]))
-    tool = pose[:3, 3] + pose[:3, :3] @ TOOL_IN_CAMERA
-    for box in (box for obstacle in obstacles for box in obstacle.boxes):
-        c, s = math.cos(box.yaw), math.sin(box.yaw)
-        x, y, z = tool - box.centre
-        outside = np.abs([c * x + s * y, c * y - s * x, z]) - box.half_extent
-        if np.linalg.norm(np.maximum(outside, 0.0)) < _START_ROOM:
-            return False
-    return True
-
-
-def _lasting_box(obstacle: ObstacleSpec) -> Box:
-    boxes, motion = obstacle.boxes, obstacle.motion
-    return boxes[len(boxes) // 2] if motion is not None and motion.to_and_fro else boxes[-1]
-
-
-def _told_apart(target: TargetSpec, distractor: TargetSpec, camera: FloatArray, gaze: FloatArray) -> bool:
-    """Whether the target is clearly the one nearer to the image centre, and the straight way to it is free."""
-    axis = (gaze - camera) / np.linalg.norm(gaze - camera)
-    offsets = []
-    for red in (target, distractor):
-        ray = np.array(red.position) - camera
-        offsets.append(float(np.linalg.norm(ray - (ray @ axis) * axis)) / float(ray @ axis))
-    if offsets[1] < 1.5 * offsets[0] + 0.05:
-        return False
-    start = camera - target.position
-    return bool(
-        free_directions(np.array(target.position), [distractor.box], start[None] / np.linalg.norm(start), 0.0)[0]
-    )
-
-
-# -- parts of a scene ----------------------------------------------------------------------------------------------
+    return Room(box_set(reds), hand_boxes(T_base_cam), ends, hand_axes(ways, rolls))
 
 
 def _sample_target(scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
@@ -192,15 +215,18 @@ def _sample_target(scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
     return TargetSpec(shape.name, scale, (float(x), float(y), float(z)), float(rng.uniform(-math.pi, math.pi)))
 
 
-def _sample_view(scenario: Scenario, centre: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Camera position and the point it looks at, both in base."""
-    bearing = math.atan2(centre[1], centre[0])
-    azimuth = bearing + math.radians(rng.uniform(35.0, 60.0))
-    elevation = math.radians(rng.uniform(*scenario.view_elevation_deg))
-    distance = rng.uniform(0.42, 0.50)
-    direction = approach_directions(np.array([azimuth]), np.array([elevation]))[0]
-    gaze_error = rng.uniform(-0.06, 0.06, 3) * [1.0, 1.0, 0.0]
-    return centre + distance * direction, centre + gaze_error
+def _grasped_yaw(target: TargetSpec, free: Way, rng: np.random.Generator) -> float:
+    """A yaw at which the fingers can close on the target from the free way; what is round may stand as it likes.
+
+    Flat fingers that are turned far would touch the table, so the lower the way the less the hand may turn.
+    """
+    if target.shape not in ("box", "duck"):
+        return target.yaw
+    steepness = (free.elevation - math.radians(45.0)) / math.radians(25.0)
+    most = _LOW_ROLL + (_LARGEST_ROLL - _LOW_ROLL) * min(max(steepness, 0.0), 1.0)
+    # The fingers open along the image's x axis, which is across the way: then the target's y axis is along it.
+    quarter = math.pi / 2 * float(rng.integers(4)) if target.shape == "box" else math.pi * float(rng.integers(2))
+    return float((free.azimuth + quarter + rng.uniform(-most, most) + math.pi) % (2.0 * math.pi) - math.pi)
 
 
 def _pushed(target: TargetSpec, scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
@@ -220,32 +246,193 @@ def _sample_distractor(scenario: Scenario, target: TargetSpec, rng: np.random.Ge
     return replace(red, position=(float(x), float(y), red.position[2]))
 
 
-def _sample_obstacles(
-    scenario: Scenario,
-    target: TargetSpec,
-    distractor: TargetSpec | None,
-    camera: FloatArray,
-    screen: str | None,
-    rng: np.random.Generator,
-) -> tuple[ObstacleSpec, ...] | None:
-    """Obstacles with room for each, or a screen alone; None if there is no room."""
-    count = int(rng.integers(scenario.obstacle_count[0], scenario.obstacle_count[1] + 1))
-    reds = target.places if distractor is None else np.concatenate([target.places, distractor.places])
-    if distractor is not None and np.linalg.norm(target.places - distractor.position, axis=1).min() < 0.10:
+def _told_apart(target: TargetSpec, distractor: TargetSpec, camera: FloatArray, gaze: FloatArray) -> bool:
+    """Whether the target is clearly the one nearer to the image centre."""
+    if np.linalg.norm(target.places - distractor.position, axis=1).min() < 0.10:
+        return False
+    axis = (gaze - camera) / np.linalg.norm(gaze - camera)
+    offsets = []
+    for red in (target, distractor):
+        ray = np.array(red.position) - camera
+        offsets.append(float(np.linalg.norm(ray - (ray @ axis) * axis)) / float(ray @ axis))
+    return offsets[1] >= 1.5 * offsets[0] + 0.05
+
+
+# -- obstacles ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """An obstacle that has room, if no other were there, and what it bars."""
+
+    obstacle: ObstacleSpec
+    boxes: BoxSet
+    barred: MaskArray
+    """Ways of the reach's grid that it bars."""
+    first: bool
+    """Whether it was drawn as the first one of its scene."""
+
+
+def _bar_ways(scenario: Scenario, start: _Start, rng: np.random.Generator) -> list[ObstacleSpec] | None:
+    """Obstacles that bar all ways but those near the free one; None if that does not come about.
+
+    Candidates are drawn as if they were alone; then those that bar most are taken, if they have room beside the others.
+    """
+    ways = reachable_directions(start.room.ends[-1])
+    near_free = ways @ _direction(start.free) > math.cos(_NEAR_FREE)
+    first_sight = int(np.argmax(ways @ _direction(start.view)))
+    if ways[first_sight] @ _direction(start.free) > math.cos(_APART):
         return None
-    if screen is not None:
-        alone = sample_screen(scenario, screen, np.array(target.position), rng)
-        return (alone,) if has_room(alone, reds, []) else None
-    obstacles: list[ObstacleSpec] = []
-    for index in range(count):
-        kind = str(rng.choice(scenario.obstacle_kinds))
-        if kind == "mirror" and any(obstacle.kind == "mirror" for obstacle in obstacles):
-            return None
-        obstacle = sample_obstacle(scenario, kind, np.array(target.position), camera, index == 0, rng)
-        if obstacle is None or not has_room(obstacle, reds, obstacles):
-            return None
-        obstacles.append(obstacle)
-    return tuple(obstacles)
+    candidates: list[_Candidate] = []
+    for batch in _BATCHES:
+        for index in range(batch):
+            wanted = ways[first_sight if index < batch // 4 else rng.integers(len(ways))]
+            candidate = _draw_candidate(scenario, start, index < batch // 4, ways, wanted, rng)
+            if candidate is not None:
+                candidates.append(candidate)
+        chosen = _covering(scenario, start, candidates, ways, near_free, first_sight)
+        if chosen is not None:
+            return chosen
+    return None
+
+
+def _covering(
+    scenario: Scenario,
+    start: _Start,
+    candidates: list[_Candidate],
+    ways: FloatArray,
+    near_free: MaskArray,
+    first_sight: int,
+) -> list[ObstacleSpec] | None:
+    """Obstacles out of the candidates that bar enough together; None if there are none."""
+    least, most = scenario.obstacle_count
+    for first in (candidate for candidate in candidates if candidate.first):
+        chosen, open_ways = [first], ~first.barred
+        left = [candidate for candidate in candidates if not candidate.first]
+        while not (len(chosen) >= least and _is_barred(open_ways, near_free, first_sight)) and left:
+            if len(chosen) == most:
+                break
+            left = [item for item in left if _fits(item, chosen)]
+            gains = [int((item.barred & open_ways).sum()) for item in left]
+            if not left or (max(gains) == 0 and len(chosen) >= least):
+                break
+            best = left.pop(int(np.argmax(gains)))
+            chosen.append(best)
+            open_ways = open_ways & ~best.barred
+        obstacles = [item.obstacle for item in chosen]
+        if len(chosen) >= least and _is_barred(open_ways, near_free, first_sight):
+            if scenario.discovery and not _is_discovered(start, chosen, ways, near_free, first_sight):
+                continue
+            if visible_share(start.camera, start.target, obstacles) >= _LEAST_VISIBLE:
+                return obstacles
+    return None
+
+
+def _fits(item: _Candidate, chosen: list[_Candidate]) -> bool:
+    """Whether a candidate has room beside those that were chosen."""
+    if item.obstacle.kind == "mirror" and any(other.obstacle.kind == "mirror" for other in chosen):
+        return False  # MuJoCo draws one reflection only
+    if any(boxes_meet(item.boxes, other.boxes, OBSTACLE_GAP) for other in chosen):
+        return False
+    return True
+
+
+def _is_discovered(
+    start: _Start, chosen: list[_Candidate], ways: FloatArray, near_free: MaskArray, first_sight: int
+) -> bool:
+    """Whether the nearest way that the first obstacle leaves is barred by something out of view at the start."""
+    around = np.where(chosen[0].barred | near_free, -1.0, ways @ ways[first_sight])
+    natural = int(np.argmax(around))
+    first = [chosen[0].obstacle]
+    return any(item.barred[natural] and not is_seen(item.obstacle, start.pose, first) for item in chosen[1:])
+
+
+def _is_barred(open_ways: MaskArray, near_free: MaskArray, first_sight: int) -> bool:
+    """Whether the first line of sight and enough of all other ways are barred, those from above in particular."""
+    above = (REACH_GRID[:, 1] > _ABOVE) & ~near_free
+    return bool(
+        not open_ways[first_sight]
+        and open_ways.mean() <= _MOST_OPEN
+        and (open_ways[above].mean() <= _MOST_ABOVE if above.any() else True)
+    )
+
+
+def _draw_candidate(
+    scenario: Scenario,
+    start: _Start,
+    first: bool,
+    ways: FloatArray,
+    way: FloatArray,
+    rng: np.random.Generator,
+) -> _Candidate | None:
+    """An obstacle to bar ``way``, as near to the target as the free ways allow, if it is what the scenario asks for."""
+    beyond = _beyond(_direction(start.free), way, rng.uniform(*_BEYOND))
+    drawn = draw_kind(scenario, first, float(beyond[2]), rng)
+    if drawn is None:
+        return None
+    kind, material = drawn
+    bearing = start.free.azimuth if kind.around else math.atan2(-beyond[1], -beyond[0]) + rng.normal(0.0, 0.2)
+    nearest, farthest = kind.distance
+    obstacle = draw_obstacle(kind, material, start.room.ends[-1], bearing, nearest, scenario, rng)
+    outward = bearing + math.pi if kind.around else bearing  # what stands around the target draws back from the way
+    boxes = box_set(obstacle.boxes)
+    step = -_STEP_OUT * np.array([math.cos(outward), math.sin(outward), 0.0])
+    steps = start.room.first_place(boxes, step, int((farthest - nearest) / _STEP_OUT))
+    if steps is None:
+        return None
+    boxes, obstacle = boxes.moved(steps * step), moved_out(obstacle, outward, steps * _STEP_OUT)
+    if first and scenario.through_sight and not passes_through(obstacle.box, start.camera, start.room.ends[0]):
+        return None
+    barred = ~free_directions(start.room.ends[-1], boxes, ways, -_BARRED_DEPTH)
+    return _Candidate(obstacle, boxes, barred, first)
+
+
+def _beyond(free: FloatArray, way: FloatArray, angle: float) -> FloatArray:
+    """The direction that lies beyond ``way``, seen from the free one, by ``angle`` rad, but above the table.
+
+    What stands there bars the way without being in the free one: the hand is wide.
+    """
+    across = way - (way @ free) * free
+    across /= max(float(np.linalg.norm(across)), 1e-9)
+    total = math.acos(float(np.clip(way @ free, -1.0, 1.0))) + angle
+    direction = math.cos(total) * free + math.sin(total) * across
+    direction[2] = max(direction[2], 0.05)
+    return direction / np.linalg.norm(direction)
+
+
+def _add_movers(
+    scenario: Scenario, start: _Start, barriers: list[ObstacleSpec], rng: np.random.Generator
+) -> list[ObstacleSpec] | None:
+    """The obstacles with those that move; None if there is no room for them."""
+    count = int(rng.integers(scenario.moving_count[0], scenario.moving_count[1] + 1))
+    obstacles = list(barriers)
+    for _ in range(_MOVER_TRIES):
+        if len(obstacles) == len(barriers) + count:
+            return obstacles
+        materials = [name for name in scenario.obstacle_materials if name != "mirror"]
+        mover = draw_mover(scenario, _THING, str(rng.choice(materials)), start.room.ends[-1], rng)
+        others, boxes = box_set([box for obstacle in obstacles for box in obstacle.boxes]), box_set(mover.boxes)
+        if not start.room.holds(boxes) or boxes_meet(boxes, others, OBSTACLE_GAP):
+            continue
+        if visible_share(start.camera, start.target, [*obstacles, mover]) >= _LEAST_VISIBLE:
+            obstacles.append(mover)
+    return obstacles if len(obstacles) == len(barriers) + count <= MAX_OBSTACLES else None
+
+
+def _grasp_turns(target: TargetSpec, free: Way) -> list[float]:
+    """Turn of the hand about its axis that the grasp of a target with sides needs, rad; none for what is round."""
+    if target.shape not in ("box", "duck"):
+        return []
+    period = math.pi / 2 if target.shape == "box" else math.pi
+    return [(target.yaw - free.azimuth + period / 2) % period - period / 2]
+
+
+# -- pieces ------------------------------------------------------------------------------------------------------------
+
+
+def _direction(way: Way) -> FloatArray:
+    """Unit vector from the target to a camera on that way, shape (3,), in base."""
+    return approach_directions(np.array([way.azimuth]), np.array([way.elevation]))[0]
 
 
 def _with_coloured_frames(scene: SceneSpec, rng: np.random.Generator) -> SceneSpec:

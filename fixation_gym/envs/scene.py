@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from fixation_gym.control.corridor import Box, approach_directions
+from fixation_gym.control.corridor import Box
 from fixation_gym.envs.motion import Motion, places
-from fixation_gym.envs.object_pool import Vector, obstacle_shape, target_shape
+from fixation_gym.envs.object_pool import target_shape
+from fixation_gym.envs.shapes import Shape, Vector
 from fixation_gym.types import FloatArray
 
 TABLE_HEIGHT = -0.112
@@ -18,9 +18,6 @@ TARGET_REGION = ((0.50, 0.62), (-0.14, 0.14))
 """Ranges of x and y in which the target is placed, in base, m."""
 DARK_FRAME = (0.16, 0.17, 0.20, 1.0)
 """Usual colour of frames and rims."""
-APPROACH_AZIMUTHS = np.radians(np.linspace(15.0, 75.0, 5))
-APPROACH_ELEVATIONS = np.radians(np.linspace(45.0, 83.0, 5))
-"""Directions, relative to the bearing of the target, from which the arm can reach it; one must be free of obstacles."""
 
 
 @dataclass(frozen=True)
@@ -50,26 +47,29 @@ class ObstacleSpec:
     """One obstacle, centre in base at reset in m; ``texture`` dresses solid parts, ``rgba`` the see-through ones."""
 
     kind: str
-    shape: str
-    scale: float
+    """What it is made of, one of ``obstacle_kinds.MATERIALS``."""
+    shape: Shape
     position: Vector
     yaw: float
     rgba: tuple[float, float, float, float]
     texture: str
-    has_label: bool
     motion: Motion | None = None
     frame_rgba: tuple[float, float, float, float] = DARK_FRAME
 
     @property
     def box(self) -> Box:
         """Upright box around the obstacle at reset, in base."""
-        half = np.array(obstacle_shape(self.kind, self.shape).half_extent) * self.scale
-        return Box(np.array(self.position), half, self.yaw)
+        return Box(np.array(self.position), np.array(self.shape.half_extent), self.yaw)
 
     @property
     def boxes(self) -> list[Box]:
-        """The box at all places of its planned way, from first to last, in base."""
-        return [Box(self.box.centre + offset, self.box.half_extent, self.yaw) for offset in places(self.motion)]
+        """Boxes around its parts at all places of its planned way, in base."""
+        return [box for offset in places(self.motion) for box in self.boxes_at(offset)]
+
+    def boxes_at(self, offset: FloatArray) -> list[Box]:
+        """Boxes around its parts when it is off its place at reset by ``offset``, shape (3,), m."""
+        x, y, z = np.array(self.position) + offset
+        return self.shape.boxes((float(x), float(y), float(z)), self.yaw)
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,5 @@ class SceneSpec:
     table_texture: str
     distractor: TargetSpec | None = None
     """Another object of the target's colour. At the start the target is the one nearer to the image centre."""
-
-
-def reachable_directions(target: FloatArray) -> FloatArray:
-    """Unit vectors from the target to the camera that the arm can take up, shape (n, 3), in base."""
-    bearing = math.atan2(target[1], target[0])
-    return approach_directions(bearing + APPROACH_AZIMUTHS, APPROACH_ELEVATIONS)
+    free_way: tuple[float, float] | None = None
+    """Azimuth in base and elevation of the way that was left free, rad; None without obstacles."""

@@ -6,7 +6,8 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 
-from fixation_gym.envs.object_pool import MAX_OBSTACLES, OBSTACLE_SHAPES, TARGET_SHAPES, Part, Shape
+from fixation_gym.envs.object_pool import SLOTS, TARGET_SHAPES
+from fixation_gym.envs.shapes import Part, Shape
 from fixation_gym.robot import CAMERA_FOVY, CAMERA_IN_HAND
 
 CAMERA_NAME = "wrist"
@@ -32,7 +33,7 @@ TEXTURES = {
     "poster_tiles": "wood-tiles.png",
 }
 _FLAT = ("table", "poster")
-_MIRROR_MATERIAL = "mirror_glass"
+MIRROR_MATERIAL = "mirror_glass"
 
 
 def add_materials(asset: ET.Element, texture_path: Callable[[str], str]) -> None:
@@ -50,7 +51,7 @@ def add_materials(asset: ET.Element, texture_path: Callable[[str], str]) -> None
             if name.startswith("table"):
                 attributes["rgba"] = "0.7 0.7 0.7 1"  # a white table saturates the image
         ET.SubElement(asset, "material", attributes)
-    mirror = {"name": _MIRROR_MATERIAL, "rgba": "0.25 0.27 0.28 1", "reflectance": "0.85", "specular": "0.6"}
+    mirror = {"name": MIRROR_MATERIAL, "rgba": "0.25 0.27 0.28 1", "reflectance": "0.85", "specular": "0.6"}
     ET.SubElement(asset, "material", mirror)
 
 
@@ -65,58 +66,64 @@ def add_wrist_camera(hand: ET.Element) -> None:
 
 
 def add_object_pool(worldbody: ET.Element) -> None:
-    """Add target, distractor and obstacle slots, each a body with the parts of all shapes it can take."""
+    """Add target and distractor with the parts of all shapes they can take, and bodies of parts for obstacles."""
     for name in RED_BODIES:
         body = _free_body(worldbody, name)
         for shape in TARGET_SHAPES:
-            _add_parts(body, name, shape)
-    for slot in range(MAX_OBSTACLES):
-        body = _free_body(worldbody, f"obstacle{slot}")
-        for kind, shapes in OBSTACLE_SHAPES.items():
-            if kind in ("mirror", "screen") and slot > 0:
-                continue  # MuJoCo draws the reflection of one geom only; a screen stands alone
-            for shape in shapes:
-                _add_parts(body, f"obstacle{slot}", shape)
+            for index, part in enumerate(shape.parts):
+                _add_part(body, red_part_name(name, shape, index), part)
+    for slot, parts in enumerate(SLOTS):
+        name = f"obstacle{slot}"
+        body = _free_body(worldbody, name)
+        for index in range(parts):
+            _add_part(body, obstacle_part_name(name, index), _UNUSED)
 
 
-def part_name(body: str, shape: Shape, index: int) -> str:
-    """Name of the geom of one part."""
+# Off its body's frame: MuJoCo takes what is compiled in that frame to be there for ever, whatever a scene writes later.
+_UNUSED = Part("box", (0.01, 0.01, 0.01), (0.01, 0.01, 0.01), yaw=0.1, pitch=0.1)
+
+
+def red_part_name(body: str, shape: Shape, index: int) -> str:
+    """Name of the geom of one part of target or distractor."""
     return f"{body}_{shape.name}_{index}"
+
+
+def obstacle_part_name(body: str, index: int) -> str:
+    """Name of the geom of one part of an obstacle."""
+    return f"{body}_{index}"
 
 
 def _free_body(worldbody: ET.Element, name: str) -> ET.Element:
     # gravcomp is switched off when the body takes part in a scene; parked bodies float without contacts.
     body = ET.SubElement(worldbody, "body", {"name": name, "pos": "0 0 0", "gravcomp": "1"})
     ET.SubElement(body, "freejoint", {"name": f"{name}_joint"})
-    ET.SubElement(body, "inertial", {"pos": "0 0 0", "mass": "0.2", "diaginertia": "2e-4 2e-4 2e-4"})
+    ET.SubElement(body, "inertial", {"pos": "0.001 0.001 0.001", "mass": "0.2", "diaginertia": "2e-4 2e-4 2e-4"})
     return body
 
 
-def _add_parts(body: ET.Element, body_name: str, shape: Shape) -> None:
-    for index, part in enumerate(shape.parts):
-        attributes = {
-            "name": part_name(body_name, shape, index),
-            "type": part.primitive,
-            "size": _numbers(_mujoco_size(part)),
-            "pos": _numbers(part.pos),
-            "quat": _numbers(_quaternion(part)),
-            "group": str(HIDDEN_GROUP),
-            "friction": _OBJECT_FRICTION,
-            "condim": "4",
-            "rgba": "0.5 0.5 0.5 1",
-        }
-        if part.finish == "mirror":
-            attributes |= {"material": _MIRROR_MATERIAL, "rgba": "1 1 1 1"}
-        ET.SubElement(body, "geom", attributes)
+def _add_part(body: ET.Element, name: str, part: Part) -> None:
+    attributes = {
+        "name": name,
+        "type": part.primitive,
+        "size": _numbers(mujoco_size(part)),
+        "pos": _numbers(part.pos),
+        "quat": _numbers(quaternion(part)),
+        "group": str(HIDDEN_GROUP),
+        "friction": _OBJECT_FRICTION,
+        "condim": "4",
+        "rgba": "0.5 0.5 0.5 1",
+    }
+    ET.SubElement(body, "geom", attributes)
 
 
-def _mujoco_size(part: Part) -> tuple[float, ...]:
+def mujoco_size(part: Part) -> tuple[float, ...]:
+    """Sizes as MuJoCo wants them for the primitive."""
     if part.primitive == "cylinder":
         return (part.size[0], part.size[2])
     return part.size[:1] if part.primitive == "sphere" else part.size
 
 
-def _quaternion(part: Part) -> tuple[float, float, float, float]:
+def quaternion(part: Part) -> tuple[float, float, float, float]:
     """Quaternion (w, x, y, z) of yaw about z after pitch about y."""
     cy, sy = math.cos(part.yaw / 2), math.sin(part.yaw / 2)
     cp, sp = math.cos(part.pitch / 2), math.sin(part.pitch / 2)

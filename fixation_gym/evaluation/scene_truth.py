@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import gymnasium
 import numpy as np
 
-from fixation_gym.envs.object_pool import obstacle_shape, target_shape
+from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
 from fixation_gym.evaluation.trace import SceneBox
@@ -38,10 +38,7 @@ def scene_of(env: gymnasium.Env) -> PickScene | None:
         return None
     scene = base.scene
     boxes = [_target_box(scene.target)]
-    for body in base.sim.obstacles:  # they need not be in the order of the scene: a mirror has a body of its own
-        position = base.sim.body_position(body)
-        spec = min(scene.obstacles, key=lambda obstacle: float(np.linalg.norm(position - obstacle.position)))
-        boxes.append(_obstacle_box(spec))
+    boxes += [_obstacle_box(obstacle) for obstacle in scene.obstacles]  # in the order of the simulation's bodies
     return PickScene(base, tuple(boxes))
 
 
@@ -52,5 +49,4 @@ def _target_box(target: TargetSpec) -> SceneBox:
 
 
 def _obstacle_box(obstacle: ObstacleSpec) -> SceneBox:
-    x, y, z = (size * obstacle.scale for size in obstacle_shape(obstacle.kind, obstacle.shape).half_extent)
-    return SceneBox(obstacle.kind, (x, y, z), obstacle.yaw)
+    return SceneBox(obstacle.kind, obstacle.shape.half_extent, obstacle.yaw)

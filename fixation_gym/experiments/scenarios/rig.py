@@ -11,11 +11,10 @@ import numpy as np
 from fixation_gym.control.servo_laws import gaze_rotation, roll_rate
 from fixation_gym.envs import sensors
 from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE, SensorNoise
-from fixation_gym.envs.object_pool import obstacle_shape
 from fixation_gym.envs.pick_sim import PickSim
 from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
-from fixation_gym.envs.scene_mjcf import CAMERA_NAME, HIDDEN_GROUP, part_name
+from fixation_gym.envs.scene_mjcf import CAMERA_NAME, HIDDEN_GROUP, obstacle_part_name
 from fixation_gym.envs.truth_view import Truth, TruthView
 from fixation_gym.experiments.scenarios.scenes import Instance, sample_instance
 from fixation_gym.geometry.camera import Intrinsics
@@ -148,9 +147,8 @@ class ScenarioRig:
 
 def _trimmings(body: str, obstacle: ObstacleSpec) -> list[tuple[str, int]]:
     """Names and indices of the rims and labels of an obstacle."""
-    shape = obstacle_shape(obstacle.kind, obstacle.shape)
-    parts = enumerate(shape.parts)
-    return [(part_name(body, shape, index), index) for index, part in parts if part.finish in ("rim", "label")]
+    parts = enumerate(obstacle.shape.parts)
+    return [(obstacle_part_name(body, index), index) for index, part in parts if part.finish in ("rim", "label")]
 
 
 def _command(instance: Instance, time: float, percept: Percept, observation: Observation) -> FloatArray:

@@ -7,12 +7,13 @@ clearly farther: no obstacle lies within 12 % of Z_f. Everything stands on the t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fixation_gym.envs.object_pool import OBSTACLE_SHAPES, Shape, obstacle_shape
+from fixation_gym.envs.object_pool import THINGS
 from fixation_gym.envs.scene import ObstacleSpec, SceneSpec
+from fixation_gym.envs.shapes import scaled, without
 from fixation_gym.experiments.scenarios.view import MARGIN, SceneView, sample_view
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.types import FloatArray
@@ -160,7 +161,7 @@ def _reflection_scene(view: SceneView, variant: str, rng: np.random.Generator) -
     mirror = _changed(mirror, mirror.position, mirror.yaw + turn)
     centre, eye = np.array(mirror.position), view.T_base_cam[:3, 3]
     normal = np.array([math.cos(mirror.yaw), math.sin(mirror.yaw), 0.0])
-    half = np.array(obstacle_shape("mirror", "mirror").half_extent) * mirror.scale
+    half = np.array(mirror.shape.half_extent)
     # The image lies on the ray from the eye through some point of the mirror, where it stands on the table.
     across = np.array([-normal[1], normal[0], 0.0]) * half[1] * rng.uniform(-0.5, 0.5)
     through = centre + across + [0.0, 0.0, half[2] * rng.uniform(0.4, 0.9)]
@@ -204,11 +205,12 @@ def _standing(
     scales: tuple[float, float] = (0.6, 1.0),
 ) -> ObstacleSpec | None:
     """A thing of some kind at an image column, or None if it is not clearly nearer or farther than the target."""
-    shapes = OBSTACLE_SHAPES[kind]
-    shape: Shape = shapes[int(rng.integers(len(shapes)))]
-    scale = float(rng.uniform(*scales))
+    shapes = THINGS[kind]
+    shape = scaled(shapes[int(rng.integers(len(shapes)))], float(rng.uniform(*scales)))
+    if rng.random() < 0.5:
+        shape = without(shape, "label")
     depth = view.depth * float(rng.uniform(*(nearness if in_front else (1.2, 1.8))))
-    position = view.standing(x, depth, shape.half_extent[2] * scale)
+    position = view.standing(x, depth, shape.half_extent[2])
     if position is None:
         return None
     solid = kind == "opaque"
@@ -216,15 +218,13 @@ def _standing(
     tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
     obstacle = ObstacleSpec(
         kind=kind,
-        shape=shape.name,
-        scale=scale,
+        shape=shape,
         position=(float(position[0]), float(position[1]), float(position[2])),
         yaw=yaw,
         rgba=(float(tint[0]), float(tint[1]), float(tint[2]), float(rng.uniform(0.3, 0.9))),
         texture=str(rng.choice(_TEXTURES)),
-        has_label=bool(rng.random() < 0.5),
     )
-    half_width = (math.hypot(*shape.half_extent[:2]) if solid else shape.half_extent[1]) * scale
+    half_width = math.hypot(*shape.half_extent[:2]) if solid else shape.half_extent[1]
     hides = in_front and kind != "translucent" and abs(x) * depth - half_width < _TARGET_ROOM * depth / view.depth
     return obstacle if view.is_clearly(obstacle, in_front) and not hides else None
 
@@ -246,8 +246,7 @@ def _changed(
     obstacle: ObstacleSpec, position: tuple[float, float, float], yaw: float, texture: str | None = None
 ) -> ObstacleSpec:
     """The same obstacle elsewhere, or with another texture."""
-    o = obstacle
-    return ObstacleSpec(o.kind, o.shape, o.scale, position, yaw, o.rgba, texture or o.texture, o.has_label)
+    return replace(obstacle, position=position, yaw=yaw, texture=texture or obstacle.texture)
 
 
 def _complete(obstacles: list[ObstacleSpec | None]) -> list[ObstacleSpec] | None:
@@ -261,8 +260,7 @@ def _has_room(obstacles: list[ObstacleSpec], target: FloatArray) -> bool:
     circles = [(target[:2], 0.06)]
     for obstacle in obstacles:
         centre = np.array(obstacle.position[:2])
-        half = obstacle_shape(obstacle.kind, obstacle.shape).half_extent
-        radius = math.hypot(half[0], half[1]) * obstacle.scale
+        radius = math.hypot(*obstacle.shape.half_extent[:2])
         if not (0.20 < centre[0] < 0.92 and abs(centre[1]) < 0.37):
             return False
         if any(np.linalg.norm(centre - other) < radius + reach for other, reach in circles):

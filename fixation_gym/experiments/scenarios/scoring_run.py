@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.control.obstacle_term import obstacle_term
-from fixation_gym.envs.object_pool import obstacle_shape
 from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
 from fixation_gym.experiments.scenarios.scenes import CLEAR, Instance
@@ -117,11 +116,11 @@ def _described(obstacle: ObstacleSpec, record: _Record, instance: Instance, inde
     nearness = float(np.median(record.sides))
     if abs(nearness - 1.0) < DEPTH_MARGIN:
         return None
-    finishes = {part.finish for part in obstacle_shape(obstacle.kind, obstacle.shape).parts}
-    trimmed = not instance.bare and ("rim" in finishes or obstacle.has_label)
+    finishes = {part.finish for part in obstacle.shape.parts}
+    trimmed = not instance.bare and bool({"rim", "label"} & finishes)
     return {
         "kind": obstacle.kind,
-        "shape": obstacle.shape,
+        "shape": obstacle.shape.name,
         "alpha": obstacle.rgba[3] if obstacle.kind == "translucent" else 1.0,
         "trimmed": trimmed,
         "moves": index == instance.mover,

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from fixation_gym.control.corridor import approach_directions
-from fixation_gym.envs.object_pool import obstacle_shape, target_shape
+from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, ObstacleSpec, TargetSpec
 from fixation_gym.geometry.rigid import inverse, look_at, transform
 from fixation_gym.types import FloatArray
@@ -39,7 +39,7 @@ class SceneView:
 
     def depths(self, obstacle: ObstacleSpec) -> FloatArray:
         """Depth of the corners of an obstacle's box, relative to the target's."""
-        half = np.array(obstacle_shape(obstacle.kind, obstacle.shape).half_extent) * obstacle.scale
+        half = np.array(obstacle.shape.half_extent)
         corners = np.array(list(product((-1.0, 1.0), repeat=3))) * half
         c, s = math.cos(obstacle.yaw), math.sin(obstacle.yaw)
         turned = corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])

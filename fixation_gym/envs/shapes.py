@@ -1,0 +1,153 @@
+"""Rigid shapes as values: parts, which are primitives, and what follows from them. Lengths are half sizes in m.
+
+A shape's origin is the centre of its bounding box; +z is up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from fixation_gym.control.corridor import Box
+from fixation_gym.types import FloatArray
+
+Vector = tuple[float, float, float]
+Primitive = Literal["box", "cylinder", "sphere", "ellipsoid"]
+Finish = Literal["solid", "glass", "rim", "label", "mirror"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One primitive of a shape."""
+
+    primitive: Primitive
+    size: Vector
+    """Half sizes along x, y, z; a cylinder is (radius, radius, half height)."""
+    pos: Vector = (0.0, 0.0, 0.0)
+    yaw: float = 0.0
+    """Rotation about z, rad."""
+    pitch: float = 0.0
+    """Rotation about y before ``yaw``, rad."""
+    finish: Finish = "solid"
+    density: float = 1.0
+    """Relative to the other parts of the shape: a heavy foot keeps what leans over from toppling."""
+
+    @property
+    def rotation(self) -> FloatArray:
+        """Rotation of the part's axes in the shape's, shape (3, 3)."""
+        cy, sy, cp, sp = math.cos(self.yaw), math.sin(self.yaw), math.cos(self.pitch), math.sin(self.pitch)
+        return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
+
+    @property
+    def reach(self) -> FloatArray:
+        """Half sizes of the upright box around it, shape (3,), m."""
+        return np.abs(self.rotation) @ np.array(self.size)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A rigid object: its parts, bounding box and mass."""
+
+    name: str
+    parts: tuple[Part, ...]
+    half_extent: Vector
+    """Half bounding box, m."""
+    mass: float
+    """kg."""
+
+    def boxes(self, position: Vector, yaw: float) -> list[Box]:
+        """Boxes around all its parts for a shape at ``position``, turned by ``yaw`` about the vertical, in base."""
+        c, s = math.cos(yaw), math.sin(yaw)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return [
+            Box(np.array(position) + turn @ np.array(part.pos), np.array(part.size), yaw + part.yaw, part.pitch)
+            for part in self.parts
+        ]
+
+
+def centred(name: str, parts: tuple[Part, ...], mass: float) -> tuple[Shape, Vector]:
+    """A shape of parts given in any frame, and where its origin, the centre of its bounding box, is in that frame."""
+    low = np.min([np.array(part.pos) - part.reach for part in parts], axis=0)
+    high = np.max([np.array(part.pos) + part.reach for part in parts], axis=0)
+    origin, half = 0.5 * (low + high), 0.5 * (high - low)
+    moved = tuple(replace(part, pos=_vector(np.array(part.pos) - origin)) for part in parts)
+    return Shape(name, moved, _vector(half), mass), _vector(origin)
+
+
+def scaled(shape: Shape, factor: float) -> Shape:
+    """The shape with all lengths multiplied by ``factor``, of the same density."""
+    parts = tuple(
+        replace(part, size=_vector(np.array(part.size) * factor), pos=_vector(np.array(part.pos) * factor))
+        for part in shape.parts
+    )
+    return Shape(shape.name, parts, _vector(np.array(shape.half_extent) * factor), shape.mass * factor**3)
+
+
+def without(shape: Shape, finish: Finish) -> Shape:
+    """The shape without the parts of one finish, as a bottle without its label."""
+    return replace(shape, parts=tuple(part for part in shape.parts if part.finish != finish))
+
+
+def _vector(values: FloatArray) -> Vector:
+    return (float(values[0]), float(values[1]), float(values[2]))
+
+
+# -- what is made of several parts -----------------------------------------------------------------------------------
+
+
+def ring(radius: float, half_height: float, thickness: float, segments: int) -> tuple[Part, ...]:
+    """Upright hollow cylinder of outer ``radius`` made of boxes."""
+    middle = radius - thickness
+    half_chord = middle * math.tan(math.pi / segments) + 0.3 * thickness
+    angles = [2.0 * math.pi * i / segments for i in range(segments)]
+    return tuple(
+        Part("box", (thickness, half_chord, half_height), (middle * math.cos(a), middle * math.sin(a), 0.0), yaw=a)
+        for a in angles
+    )
+
+
+def cage(half_x: float, half_y: float, half_z: float, bar: float) -> tuple[Part, ...]:
+    """The twelve edges of a box as thin bars."""
+    signs = [(a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    x, y, z = half_x - bar, half_y - bar, half_z - bar
+    along_x = tuple(Part("box", (half_x, bar, bar), (0.0, a * y, b * z), finish="rim") for a, b in signs)
+    along_y = tuple(Part("box", (bar, half_y, bar), (a * x, 0.0, b * z), finish="rim") for a, b in signs)
+    along_z = tuple(Part("box", (bar, bar, half_z), (a * x, b * y, 0.0), finish="rim") for a, b in signs)
+    return along_x + along_y + along_z
+
+
+_RIM = 0.005
+"""Half width of the rims of panes, m."""
+
+
+def pane(material: str, half_width: float, half_height: float, centre: Vector, pitch: float = 0.0) -> tuple[Part, ...]:
+    """A flat board of some material that faces +x, leaning by ``pitch`` about y; a mirror reflects on that side.
+
+    Args:
+        material: "opaque" (a board), "translucent" (glass with a rim), "mirror" (with a rim) or "wire" (a mesh).
+        half_width: along y, m.
+        half_height: along the board's own z, m.
+        centre: of the board, m.
+        pitch: rad; -pi/2 makes a horizontal board that faces up.
+    """
+    if material == "opaque":
+        return (Part("box", (0.006, half_width, half_height), centre, pitch=pitch),)
+    up = np.array([math.sin(pitch), 0.0, math.cos(pitch)])
+    sides = [np.array(centre) + sign * (half_width - _RIM) * np.array([0.0, 1.0, 0.0]) for sign in (-1.0, 1.0)]
+    ends = [np.array(centre) + sign * (half_height - _RIM) * up for sign in (-1.0, 1.0)]
+    thick = 0.006 if material != "wire" else 0.003
+    rim = [Part("box", (thick, _RIM, half_height), _vector(at), pitch=pitch, finish="rim") for at in sides]
+    rim += [Part("box", (thick, half_width, _RIM), _vector(at), pitch=pitch, finish="rim") for at in ends]
+    inner_width, inner_height = half_width - 2 * _RIM, half_height - 2 * _RIM
+    if material == "mirror":
+        # MuJoCo draws the reflection on a box's local +z face; a quarter turn takes it to the board's +x.
+        size = (inner_height, inner_width, 0.004)
+        return (Part("box", size, centre, pitch=pitch + math.pi / 2, finish="mirror"), *rim)
+    if material == "translucent":
+        return (Part("box", (0.003, inner_width, inner_height), centre, pitch=pitch, finish="glass"), *rim)
+    upright = Part("box", (0.002, 0.002, half_height), centre, pitch=pitch, finish="rim")
+    across = Part("box", (0.002, half_width, 0.002), centre, pitch=pitch, finish="rim")
+    return (*rim, upright, across)

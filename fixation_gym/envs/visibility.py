@@ -1,0 +1,65 @@
+"""What the camera sees of target and obstacles at the start, by lines of sight through boxes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fixation_gym.control.corridor import Box
+from fixation_gym.envs.object_pool import target_shape
+from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
+from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.types import FloatArray, MaskArray
+
+_ASPECT = 4.0 / 3.0
+"""Width of the wrist image by its height."""
+
+
+def visible_share(camera: FloatArray, target: TargetSpec, obstacles: list[ObstacleSpec]) -> float:
+    """Share of the target's box that is in view past all that is not glass, 0..1."""
+    half = np.array(target_shape(target.shape).half_extent) * target.scale
+    steps = np.array([(x, y, z) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7) for z in (-0.6, 0.6)])
+    points = target.box.centre + (steps * half) @ target.box.rotation.T
+    return float(np.mean(~_hidden(camera, points, obstacles)))
+
+
+def is_seen(obstacle: ObstacleSpec, T_base_cam: FloatArray, others: list[ObstacleSpec]) -> bool:
+    """Whether more than a corner of an obstacle is within the image and not behind the others."""
+    boxes = obstacle.boxes_at(np.zeros(3))
+    corners = np.array([(x, y, z) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) for z in (-1.0, 0.0, 1.0)])
+    points = np.concatenate([box.centre + (corners * box.half_extent) @ box.rotation.T for box in boxes])
+    local = (points - T_base_cam[:3, 3]) @ T_base_cam[:3, :3]
+    tangent = math.tan(CAMERA_FOVY / 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inside = (local[:, 2] > 0.05) & (np.abs(local[:, 1]) < tangent * local[:, 2])
+        inside &= np.abs(local[:, 0]) < _ASPECT * tangent * local[:, 2]
+    seen = inside & ~_hidden(T_base_cam[:3, 3], points, others)
+    return bool(seen.mean() > 0.15)
+
+
+def passes_through(box: Box, camera: FloatArray, point: FloatArray) -> bool:
+    """Whether the line from camera to point passes through the inner part of a box."""
+    inner = Box(box.centre, 0.85 * box.half_extent, box.yaw, box.pitch)
+    return bool(_crossed(camera, point[None], inner)[0])
+
+
+def _hidden(camera: FloatArray, points: FloatArray, obstacles: list[ObstacleSpec]) -> MaskArray:
+    """Points, shape (n, 3), whose line of sight meets something that is not glass."""
+    hidden = np.zeros(len(points), dtype=bool)
+    for obstacle in obstacles:
+        for part, box in zip(obstacle.shape.parts, obstacle.boxes_at(np.zeros(3)), strict=True):
+            if part.finish != "glass":
+                hidden |= _crossed(camera, points, box)
+    return hidden
+
+
+def _crossed(camera: FloatArray, points: FloatArray, box: Box) -> MaskArray:
+    """Which of the segments from the camera to points, shape (n, 3), meet a box."""
+    rotation = box.rotation
+    begin, ends = (camera - box.centre) @ rotation, (points - box.centre) @ rotation
+    along = ends - begin
+    along = np.where(np.abs(along) < 1e-12, 1e-12, along)
+    near, far = (-box.half_extent - begin) / along, (box.half_extent - begin) / along
+    enter, leave = np.minimum(near, far).max(axis=1), np.maximum(near, far).min(axis=1)
+    return (enter <= leave) & (leave >= 0.0) & (enter <= 0.999)
