@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fixation_gym.control import servo_laws
-from fixation_gym.control.corridor import Box, approach_directions, free_directions, level_axes
-from fixation_gym.envs.motion import places
+from fixation_gym.control import open_loop, servo_laws
+from fixation_gym.control.corridor import BoxSet, approach_directions, box_set, free_directions, joined, level_axes
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.reach import reachable_directions
 from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
@@ -20,15 +19,21 @@ from fixation_gym.types import FloatArray
 from policies.base import Action, Estimate
 
 if TYPE_CHECKING:
-    from fixation_gym.envs.pick_env import FixationPickEnv
+    from fixation_gym.envs.pick_sim import PickSim
 
 IntArray = NDArray[np.int64]
 
-_VIEW_DISTANCE, _GRASP_DISTANCE, _RETREAT_DISTANCE = 0.42, 0.18, 0.30
+VIEW_DISTANCE, GRASP_DISTANCE = 0.42, 0.18
+"""Distance of the camera from the target on the way around it, and at the end of the approach, m."""
+_RETREAT_DISTANCE = 0.30
+_SPEED = 0.10
+"""Of the approach, m/s."""
 _ROUND_SHAPES = ("cylinder", "ball", "ring")
 _CLOSE_SECONDS = 0.8
 _HELD = 0.045
 """A target whose centre is farther than this from the tool's point is not held, m."""
+_LIFT_HEIGHT = 0.135
+"""How far to lift, m."""
 _PALM_ROOM = 0.029
 """Depth to which a thing fits between the fingers behind the tool's point, m."""
 _FOLDED = 0.36
@@ -43,15 +48,33 @@ _NEAR_ANGLE = math.radians(4.0)
 _PHASES = ("fixate", "approach", "grasp", "close", "lift")
 
 
+class SimulatedWorld(Protocol):
+    """What a privileged policy looks into; an unwrapped ``FixationPick-v0`` is one."""
+
+    @property
+    def sim(self) -> PickSim:
+        """The simulation."""
+        ...
+
+    @property
+    def scene(self) -> SceneSpec | None:
+        """The scene of the episode; None before the first."""
+        ...
+
+
 class OraclePolicy:
     """Circles the target until a straight approach is free, goes in, grasps, lifts; uses true poses only.
 
     It knows where every obstacle will ever be, but not that the target will be pushed: when the target has moved, or
     the hand is empty, it backs off and starts again.
+
+    A subclass that overrides ``choose`` and ``come_in`` takes another way with the same motions.
     """
 
-    def __init__(self, env: FixationPickEnv) -> None:
-        """Look into ``env``, an unwrapped ``FixationPick-v0``."""
+    view_distance = VIEW_DISTANCE
+
+    def __init__(self, env: SimulatedWorld) -> None:
+        """Look into ``env``, such as an unwrapped ``FixationPick-v0``."""
         self._env = env
         self.estimate: Estimate | None = None
         self.reset()
@@ -61,6 +84,7 @@ class OraclePolicy:
         self._phase = "fixate"
         self._phase_start = 0.0
         self._aim = np.full(3, np.inf)
+        self._now = 0.0
         self._direction, self._grip = np.array([0.0, 0.0, 1.0]), -1
         self._goal = np.zeros(3)
         self.estimate = None
@@ -69,7 +93,8 @@ class OraclePolicy:
         """Action of shape (7,); of the observation only the time is used."""
         pose = self._env.sim.arm_state().camera_pose
         target = self._env.sim.body_position("target")
-        self._advance(pose, target, float(obs["time"][0]))
+        self._now = float(obs["time"][0])
+        self._advance(pose, target, self._now)
         if self._phase in ("fixate", "approach"):
             twist = self._fixating_twist(pose, target)
         elif self._phase == "close":
@@ -102,7 +127,7 @@ class OraclePolicy:
         arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003
         done = {
             "fixate": self._angle(pose, target) < _NEAR_ANGLE or elapsed > 8.0,
-            "approach": distance < _GRASP_DISTANCE * 1.03,
+            "approach": distance < GRASP_DISTANCE * 1.03,
             "grasp": arrived or elapsed > 4.0,
             "close": elapsed > _CLOSE_SECONDS,
             "lift": False,
@@ -119,18 +144,34 @@ class OraclePolicy:
         if phase == "grasp":
             self._goal = self._grasp_point(pose, target) - pose[:3, :3] @ TOOL_IN_CAMERA
         elif phase == "lift":
-            self._goal = pose[:3, 3] + [0.0, 0.0, 0.16]
+            self._goal = open_loop.lifted(pose, _LIFT_HEIGHT)
         elif phase == "recover":
             back = max(0.0, _RETREAT_DISTANCE - float(pose[:3, 2] @ (target - pose[:3, 3])))
             self._goal = pose[:3, 3] - back * pose[:3, 2]
 
     def _aim_at(self, pose: FloatArray, target: FloatArray, time: float) -> None:
-        """Choose the free approach that is easiest to take up, with as much room as there is."""
+        self._direction, self._grip = self.choose(pose, target, time)
+        self._aim = target.copy()
+
+    # -- the way -------------------------------------------------------------------------------------------------
+
+    def choose(self, pose: FloatArray, target: FloatArray, time: float) -> tuple[FloatArray, int]:
+        """Choose the free approach that is easiest to take up, with as much room as there is.
+
+        Args:
+            pose: T_base_cam, shape (4, 4).
+            target: its centre in base, shape (3,), m.
+            time: since reset, s.
+
+        Returns:
+            Unit vector from the target to the camera, shape (3,), in base, and the axis of the target along which the
+            fingers close; -1: any.
+        """
         directions = np.repeat(reachable_directions(target), len(self._grips), axis=0)
         grips = np.resize(self._grips, len(directions))
         rolls = self._rolls(directions, grips)
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
-        from_base = np.linalg.norm((target + _VIEW_DISTANCE * directions)[:, :2], axis=1)
+        from_base = np.linalg.norm((target + VIEW_DISTANCE * directions)[:, :2], axis=1)
         strain = 4.0 * np.maximum(0.0, _FOLDED - from_base) + 0.3 * np.abs(rolls)
         flatness = np.maximum(0.0, np.where(grips < 0, _STEEP, _STEEP_TURNED) - np.arcsin(directions[:, 2]))
         # Flat fingers touch the table, so flatness costs more than the way.
@@ -142,7 +183,16 @@ class OraclePolicy:
                 cost = np.where(free, cost, np.inf)
                 break
         best = int(np.argmin(cost))
-        self._aim, self._direction, self._grip = target.copy(), directions[best], int(grips[best])
+        return directions[best], int(grips[best])
+
+    def come_in(self, depth: float, seconds: float) -> tuple[FloatArray, float]:
+        """Direction from which to look, shape (3,), in base, and speed of the approach, m/s.
+
+        Args:
+            depth: of the target, m; inf before the approach.
+            seconds: since the approach began, s.
+        """
+        return self._direction, _SPEED
 
     @property
     def _grips(self) -> IntArray:
@@ -160,13 +210,13 @@ class OraclePolicy:
         across = np.einsum("nij,nj->ni", axes, matrix.T[np.maximum(grips, 0)])
         return np.where(grips < 0, 0.0, _half_turn(np.arctan2(across[:, 1], across[:, 0])))
 
-    def _boxes(self, time: float) -> list[Box]:
+    def _boxes(self, time: float) -> BoxSet:
         """Boxes around all places where something will be from now on."""
-        boxes = [] if self._scene.distractor is None else [self._scene.distractor.box]
+        boxes = [] if self._scene.distractor is None else [box_set([self._scene.distractor.box])]
         for obstacle in self._scene.obstacles:
             over = obstacle.motion is not None and time > obstacle.motion.end_s
-            boxes += obstacle.boxes_at(places(obstacle.motion)[-1]) if over else obstacle.boxes
-        return boxes
+            boxes.append(obstacle.last_boxes if over else obstacle.boxes)
+        return joined(boxes)
 
     @property
     def _scene(self) -> SceneSpec:
@@ -174,10 +224,16 @@ class OraclePolicy:
         assert scene is not None, "reset the environment before the policy acts"
         return scene
 
+    def _wanted(self, pose: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:
+        """Direction from which to look now, shape (3,), and speed of the approach, m/s."""
+        if self._phase != "approach":
+            return self.come_in(math.inf, 0.0)
+        return self.come_in(float(pose[:3, 2] @ (target - pose[:3, 3])), self._now - self._phase_start)
+
     def _angle(self, pose: FloatArray, target: FloatArray) -> float:
-        """Angle between the present and the chosen direction, rad."""
+        """Angle between the present and the wanted direction, rad."""
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
-        return math.acos(float(np.clip(present @ self._direction, -1.0, 1.0)))
+        return math.acos(float(np.clip(present @ self._wanted(pose, target)[0], -1.0, 1.0)))
 
     def _grasp_point(self, pose: FloatArray, target: FloatArray) -> FloatArray:
         """Where the tool goes, shape (3,), in base: to the target's centre, but neither palm nor fingers touch."""
@@ -212,26 +268,18 @@ class OraclePolicy:
     def _fixating_twist(self, pose: FloatArray, target: FloatArray) -> FloatArray:
         point = pose[:3, :3].T @ (target - pose[:3, 3])
         centroid, depth = point[:2] / point[2], float(point[2])
-        desired = _VIEW_DISTANCE if self._phase == "fixate" else _GRASP_DISTANCE
-        towards = self._next_direction(pose, target) if self._phase == "fixate" else self._direction
+        towards, speed = self._wanted(pose, target)
+        desired = GRASP_DISTANCE
+        if self._phase == "fixate":
+            desired, towards, speed = self.view_distance, _next_direction(pose, target, towards), _SPEED
         offset = pose[:3, :3].T @ (target + depth * towards - pose[:3, 3])
         lateral = 3.0 * offset[:2]
         lateral *= min(1.0, 0.13 / max(float(np.linalg.norm(lateral)), 1e-9))
-        forward = float(np.clip(1.5 * (depth - desired), -0.10, 0.10))
+        forward = float(np.clip(1.5 * (depth - desired), -_SPEED, speed))
         v = np.array([*lateral, forward])
         roll = servo_laws.roll_rate(self._roll_error(pose), 2.0)
         w = servo_laws.gaze_rotation(centroid, 4.0, 1.0 / depth, v, roll)
         return np.array([*v, *w, roll])
-
-    def _next_direction(self, pose: FloatArray, target: FloatArray) -> FloatArray:
-        """Direction to go to on the way to the chosen one: up first, down last, around in between."""
-        present = pose[:3, 3] - target
-        height = math.atan2(present[2], math.hypot(present[0], present[1]))
-        wanted = math.asin(float(np.clip(self._direction[2], -1.0, 1.0)))
-        if wanted < height + math.radians(8.0):
-            return self._direction
-        azimuth = math.atan2(-present[1], -present[0])
-        return approach_directions(np.array([azimuth]), np.array([wanted]))[0]
 
     def _roll_error(self, pose: FloatArray) -> float:
         """Level at first and for round targets, otherwise across the target's chosen axis, rad."""
@@ -241,6 +289,17 @@ class OraclePolicy:
         matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)
         across = pose[:3, :3].T @ matrix[:, self._grip]
         return float(_half_turn(math.atan2(across[1], across[0])))
+
+
+def _next_direction(pose: FloatArray, target: FloatArray, direction: FloatArray) -> FloatArray:
+    """Direction to go to on the way to another one: up first, down last, around in between."""
+    present = pose[:3, 3] - target
+    height = math.atan2(present[2], math.hypot(present[0], present[1]))
+    wanted = math.asin(float(np.clip(direction[2], -1.0, 1.0)))
+    if wanted < height + math.radians(8.0):
+        return direction
+    azimuth = math.atan2(-present[1], -present[0])
+    return approach_directions(np.array([azimuth]), np.array([wanted]))[0]
 
 
 def _half_turn(angle: Any) -> Any:

@@ -87,9 +87,11 @@ def box_set(boxes: Sequence[Box]) -> BoxSet:
     return BoxSet(centres, np.array([box.rotation for box in boxes]), halves)
 
 
-def joined(first: BoxSet, second: BoxSet) -> BoxSet:
-    """All boxes of both."""
-    return BoxSet(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+def joined(sets: Sequence[BoxSet]) -> BoxSet:
+    """All boxes of some sets."""
+    if not sets:
+        return box_set([])
+    return BoxSet(*(np.concatenate(arrays) for arrays in zip(*sets, strict=True)))
 
 
 def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
@@ -229,6 +231,32 @@ def _boxes_meet(offset: FloatArray, rotation: FloatArray, turned: FloatArray, ha
 def boxes_meet(first: BoxSet, second: BoxSet, gap: float) -> bool:
     """Whether a box of one set comes nearer than about ``gap`` m to one of the other."""
     return bool(any_pair_meets(first.centres, first.rotations, first.halves + gap, *second))
+
+
+def meeting_pairs(sets: Sequence[BoxSet], gap: float) -> MaskArray:
+    """For n sets of boxes, which of them come nearer than about ``gap`` m to each other, shape (n, n)."""
+    owners = np.repeat(np.arange(len(sets)), [len(boxes.centres) for boxes in sets])
+    return np.asarray(_meeting_pairs(*joined(sets), owners, len(sets), gap))
+
+
+@njit(cache=True)
+def _meeting_pairs(
+    places: FloatArray, turns: FloatArray, halves: FloatArray, owners: MaskArray, count: int, gap: float
+) -> MaskArray:
+    """The compiled part of ``meeting_pairs``; ``owners`` are the sets of the boxes, shape (m,)."""
+    meets = np.zeros((count, count), np.bool_)
+    reach = np.sqrt(np.sum(halves**2, axis=1)) + gap
+    for i in range(len(places)):
+        for j in range(i):
+            first, second = owners[i], owners[j]
+            if first == second or meets[first, second]:
+                continue
+            apart = places[j] - places[i]
+            if np.sum(apart**2) > (reach[i] + reach[j]) ** 2:
+                continue
+            if _boxes_meet(turns[i].T @ apart, turns[i].T @ turns[j], halves[j], halves[i] + gap):
+                meets[first, second] = meets[second, first] = True
+    return meets
 
 
 def hand_boxes(T_base_cam: FloatArray) -> BoxSet:

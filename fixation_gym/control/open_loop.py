@@ -16,6 +16,8 @@ from fixation_gym.control import servo_laws
 from fixation_gym.robot import TOOL_IN_CAMERA
 from fixation_gym.types import FloatArray
 
+_LIFT_SLOPE = 0.15
+"""How much more steeply than it came the hand lifts, per length of its way."""
 OPEN, CLOSE = -1.0, 1.0
 """Gripper commands."""
 
@@ -59,7 +61,7 @@ class OpenLoopGains:
     """Time to close the fingers, s."""
     empty_width: float = 0.012
     """Fingers closer than this hold nothing, m."""
-    lift_height: float = 0.16
+    lift_height: float = 0.135
     """How far to lift, m."""
     hold_seconds: float = math.inf
     """After this time in the lift the hand lets go and backs off, s; inf: it holds on."""
@@ -119,6 +121,16 @@ def reaimed(manoeuvre: Manoeuvre, T_base_cam: FloatArray, target: Target, gains:
     return replace(manoeuvre, goal=goal) if pushed else manoeuvre
 
 
+def lifted(T_base_cam: FloatArray, height: float) -> FloatArray:
+    """Camera position, shape (3,), in base, m, higher by ``height`` m: back the way the hand came, which was free.
+
+    A hand that came in flat goes up more steeply, or the way would be long.
+    """
+    back = -T_base_cam[:3, 2]
+    rise = np.array([back[0], back[1], max(float(back[2]), 0.0) + _LIFT_SLOPE])
+    return np.asarray(T_base_cam[:3, 3] + height / rise[2] * rise)
+
+
 def begin_recovery(T_base_cam: FloatArray, time: float, gains: OpenLoopGains) -> Manoeuvre:
     """Start backing off along the optical axis."""
     return Manoeuvre(Stage.RECOVER, time, T_base_cam[:3, 3] - T_base_cam[:3, 2] * gains.recover_distance)
@@ -144,7 +156,7 @@ def advance(
     if manoeuvre.stage is Stage.GRASP and arrived:
         return Manoeuvre(Stage.CLOSE, time, T_base_cam[:3, 3].copy())
     if manoeuvre.stage is Stage.CLOSE and seconds >= gains.close_seconds and not empty:
-        return Manoeuvre(Stage.LIFT, time, T_base_cam[:3, 3] + [0.0, 0.0, gains.lift_height])
+        return Manoeuvre(Stage.LIFT, time, lifted(T_base_cam, gains.lift_height))
     failed = {
         Stage.GRASP: seconds > gains.grasp_timeout,
         Stage.CLOSE: seconds >= gains.close_seconds,

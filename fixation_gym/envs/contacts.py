@@ -38,7 +38,7 @@ def geom_owners(model: Any, robot_bodies: tuple[str, ...]) -> Owners:
 
 
 def robot_hits(model: Any, data: Any, owners: Owners) -> bool:
-    """Whether a contact of the robot carries more than ``COLLISION_FORCE`` to an obstacle, ``TABLE_FORCE`` to the table.
+    """Whether the robot touches an obstacle with more than ``COLLISION_FORCE``, or the table with ``TABLE_FORCE``.
 
     The fingers may touch the table lightly: a thing that lies flat is grasped there.
     """

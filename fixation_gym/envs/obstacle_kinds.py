@@ -142,7 +142,7 @@ def _niche(material: str, rng: np.random.Generator) -> Parts:
 
 def _bin(material: str, rng: np.random.Generator) -> Parts:
     """Four low walls, and a lid over the side that is turned away."""
-    half_x, half_y, top = rng.uniform(0.13, 0.17), rng.uniform(0.13, 0.17), rng.uniform(0.06, 0.12)
+    half_x, half_y, top = rng.uniform(0.10, 0.14), rng.uniform(0.10, 0.14), rng.uniform(0.06, 0.12)
     second = _second(material)
     back = pane(material, half_y, 0.5 * top + 0.03, (-half_x, 0.0, 0.5 * top + 0.03))
     front = pane(second, half_y, 0.5 * top, (half_x, 0.0, 0.5 * top))

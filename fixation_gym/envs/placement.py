@@ -27,7 +27,7 @@ _DENSITY = 250.0
 """Of what obstacles are made of, kg/m^3; light wood with hollow parts."""
 _LEAST_MASS, _LARGEST_MASS = 0.3, 1.5
 _ORBIT = 0.37
-"""What is seen from the target above a slope of ``_FLAT`` stays this near to it, m: the hand can go around farther out."""
+"""What is seen above a slope of ``_FLAT`` from the target stays this near, m: the hand goes around farther out."""
 _FLAT = 0.5
 _TABLE = ((0.24, 0.90), (-0.36, 0.36))
 """Ranges of x and y of the table top on which things stand, in base, m."""
@@ -35,8 +35,6 @@ _TARGET_GAP, OBSTACLE_GAP = 0.012, 0.006
 """Least room between an obstacle and red things, and between obstacles, m."""
 FREE_ROOM = 0.01
 """Room around the hand on the free ways, m."""
-_START_ROOM = 0.04
-"""Least distance between the hand and obstacles at the start, m."""
 
 
 def draw_kind(
@@ -86,7 +84,7 @@ def draw_obstacle(
     volume = sum(part.density * 8.0 * math.prod(part.size) for part in parts)
     shape = replace(shape, mass=min(max(_DENSITY * volume, _LEAST_MASS), _LARGEST_MASS))
     c, s = math.cos(facing), math.sin(facing)
-    x, y = anchor + [c * origin[0] - s * origin[1], s * origin[0] + c * origin[1]]
+    x, y = anchor[0] + c * origin[0] - s * origin[1], anchor[1] + s * origin[0] + c * origin[1]
     tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
     return ObstacleSpec(
         kind=material,
@@ -135,9 +133,7 @@ class Room:
     """What an obstacle must keep clear of."""
 
     reds: BoxSet
-    """Boxes around target and distractor at all their places; the target's is the first."""
-    hand: BoxSet
-    """Boxes around the hand at the start."""
+    """Boxes around the target at all its places, the first one first."""
     ends: FloatArray
     """Where the target is at first and in the end, shape (n, 3), in base, m."""
     ways: FloatArray
@@ -152,7 +148,7 @@ class Room:
             most: largest number of steps.
         """
         centres, halves = swept_hand(FREE_ROOM)
-        steps = _first_place(*boxes, step, most, self.reds, self.hand, self.ends, self.ways, centres, halves)
+        steps = _first_place(*boxes, step, most, self.reds, self.ends, self.ways, centres, halves)
         return None if steps < 0 else int(steps)
 
     def holds(self, boxes: BoxSet) -> bool:
@@ -168,7 +164,6 @@ def _first_place(
     step: FloatArray,
     most: int,
     reds: BoxSet,
-    hand: BoxSet,
     ends: FloatArray,
     ways: FloatArray,
     swept: FloatArray,
@@ -180,8 +175,6 @@ def _first_place(
         if not _within_bounds(centres, turns, halves, reds[0][0]):
             continue
         if any_pair_meets(centres, turns, halves + _TARGET_GAP, reds[0], reds[1], reds[2]):
-            continue
-        if any_pair_meets(centres, turns, halves + _START_ROOM, hand[0], hand[1], hand[2]):
             continue
         free = True
         for end in range(len(ends)):

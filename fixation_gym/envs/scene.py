@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fixation_gym.control.corridor import Box
+from fixation_gym.control.corridor import Box, BoxSet, joined
 from fixation_gym.envs.motion import Motion, places
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.shapes import Shape, Vector
@@ -62,14 +62,15 @@ class ObstacleSpec:
         return Box(np.array(self.position), np.array(self.shape.half_extent), self.yaw)
 
     @property
-    def boxes(self) -> list[Box]:
+    def boxes(self) -> BoxSet:
         """Boxes around its parts at all places of its planned way, in base."""
-        return [box for offset in places(self.motion) for box in self.boxes_at(offset)]
+        boxes = self.shape.boxes(self.position, self.yaw)
+        return boxes if self.motion is None else joined([boxes.moved(offset) for offset in places(self.motion)])
 
-    def boxes_at(self, offset: FloatArray) -> list[Box]:
-        """Boxes around its parts when it is off its place at reset by ``offset``, shape (3,), m."""
-        x, y, z = np.array(self.position) + offset
-        return self.shape.boxes((float(x), float(y), float(z)), self.yaw)
+    @property
+    def last_boxes(self) -> BoxSet:
+        """Boxes around its parts at the end of its planned way, in base."""
+        return self.shape.boxes(self.position, self.yaw).moved(places(self.motion)[-1])
 
 
 @dataclass(frozen=True)

@@ -26,9 +26,10 @@ def visible_share(camera: FloatArray, target: TargetSpec, obstacles: list[Obstac
 
 def is_seen(obstacle: ObstacleSpec, T_base_cam: FloatArray, others: list[ObstacleSpec]) -> bool:
     """Whether more than a corner of an obstacle is within the image and not behind the others."""
-    boxes = obstacle.boxes_at(np.zeros(3))
+    boxes = obstacle.shape.boxes(obstacle.position, obstacle.yaw)
     corners = np.array([(x, y, z) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) for z in (-1.0, 0.0, 1.0)])
-    points = np.concatenate([box.centre + (corners * box.half_extent) @ box.rotation.T for box in boxes])
+    points = boxes.centres[:, None] + np.einsum("nij,nkj->nki", boxes.rotations, corners * boxes.halves[:, None])
+    points = points.reshape(-1, 3)
     local = (points - T_base_cam[:3, 3]) @ T_base_cam[:3, :3]
     tangent = math.tan(CAMERA_FOVY / 2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -40,26 +41,27 @@ def is_seen(obstacle: ObstacleSpec, T_base_cam: FloatArray, others: list[Obstacl
 
 def passes_through(box: Box, camera: FloatArray, point: FloatArray) -> bool:
     """Whether the line from camera to point passes through the inner part of a box."""
-    inner = Box(box.centre, 0.85 * box.half_extent, box.yaw, box.pitch)
-    return bool(_crossed(camera, point[None], inner)[0])
+    return bool(_crossed(camera, point[None], box.centre, box.rotation, 0.85 * box.half_extent)[0])
 
 
 def _hidden(camera: FloatArray, points: FloatArray, obstacles: list[ObstacleSpec]) -> MaskArray:
     """Points, shape (n, 3), whose line of sight meets something that is not glass."""
     hidden = np.zeros(len(points), dtype=bool)
     for obstacle in obstacles:
-        for part, box in zip(obstacle.shape.parts, obstacle.boxes_at(np.zeros(3)), strict=True):
+        boxes = obstacle.shape.boxes(obstacle.position, obstacle.yaw)
+        for part, centre, rotation, half in zip(obstacle.shape.parts, *boxes, strict=True):
             if part.finish != "glass":
-                hidden |= _crossed(camera, points, box)
+                hidden |= _crossed(camera, points, centre, rotation, half)
     return hidden
 
 
-def _crossed(camera: FloatArray, points: FloatArray, box: Box) -> MaskArray:
+def _crossed(
+    camera: FloatArray, points: FloatArray, centre: FloatArray, rotation: FloatArray, half: FloatArray
+) -> MaskArray:
     """Which of the segments from the camera to points, shape (n, 3), meet a box."""
-    rotation = box.rotation
-    begin, ends = (camera - box.centre) @ rotation, (points - box.centre) @ rotation
+    begin, ends = (camera - centre) @ rotation, (points - centre) @ rotation
     along = ends - begin
     along = np.where(np.abs(along) < 1e-12, 1e-12, along)
-    near, far = (-box.half_extent - begin) / along, (box.half_extent - begin) / along
+    near, far = (-half - begin) / along, (half - begin) / along
     enter, leave = np.minimum(near, far).max(axis=1), np.maximum(near, far).min(axis=1)
     return (enter <= leave) & (leave >= 0.0) & (enter <= 0.999)

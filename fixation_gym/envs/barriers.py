@@ -1,0 +1,238 @@
+"""Which obstacles bar all ways to the target but the free one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fixation_gym.control.corridor import (
+    BoxSet,
+    box_set,
+    boxes_meet,
+    free_directions,
+    hand_boxes,
+    joined,
+    meeting_pairs,
+)
+from fixation_gym.envs.config import Scenario
+from fixation_gym.envs.goal import Goal
+from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS
+from fixation_gym.envs.placement import OBSTACLE_GAP, draw_kind, draw_mover, draw_obstacle, moved_out
+from fixation_gym.envs.reach import REACH_GRID
+from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
+from fixation_gym.envs.visibility import is_seen, passes_through, visible_share
+from fixation_gym.geometry.rigid import look_at
+from fixation_gym.types import FloatArray, MaskArray
+
+_BARRED_DEPTH = 0.01
+"""A way is barred if a hand smaller by this would still touch something, m."""
+_MOST_OPEN = 0.28
+"""Largest share of the reach that is not barred in the end."""
+_ABOVE = math.radians(75.0)
+"""Ways from above are those of at least this elevation, rad."""
+_MOST_ABOVE = 0.35
+"""Largest share of them that is not barred, but for those near the free way."""
+_APART = math.radians(20.0)
+"""Least angle between the first line of sight and the free way: the hand is wide, and the former is to be barred."""
+_START_ROOM = 0.04
+"""Least distance between the hand and obstacles at the start, m."""
+_LEAST_VISIBLE = 0.5
+"""Least share of the target that is in view at the start, through glass or past everything else."""
+_BEYOND = (0.2, 0.9)
+"""Range of the angle by which an obstacle stands beyond the way that it is to bar, seen from the free one, rad."""
+_STEP_OUT = 0.02
+"""An obstacle that is in the free way is moved out by this much at a time, m."""
+_FIRST_CANDIDATES, _CANDIDATES, _MOVER_TRIES = 12, 36, 40
+"""Candidates for the first obstacle and for the others, and tries for those that move."""
+_THING = OBSTACLE_KINDS[0]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """From where the camera first looks, and what else is red."""
+
+    camera: FloatArray
+    gaze: FloatArray
+    first_sight: int
+    """Index of the way along the first line of sight."""
+    distractor: TargetSpec | None
+
+    @property
+    def pose(self) -> FloatArray:
+        """T_base_cam, shape (4, 4)."""
+        return look_at(self.camera, self.gaze, np.array([0.0, 0.0, 1.0]))
+
+    def is_apart(self, goal: Goal) -> bool:
+        """Whether it is so far from the free way that its line of sight can be barred."""
+        return bool(goal.ways[self.first_sight] @ goal.free.direction <= math.cos(_APART))
+
+    @property
+    def taken(self) -> list[BoxSet]:
+        """What is in the way of obstacles."""
+        return [] if self.distractor is None else [box_set([self.distractor.box])]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An obstacle that has room, if no other were there, and what it bars."""
+
+    obstacle: ObstacleSpec
+    boxes: BoxSet
+    barred: MaskArray
+    """Ways of the reach's grid that it bars."""
+    first: bool
+    """Whether it was drawn as the first one of its scene."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Candidates for the obstacles of a scene; rows and columns of its arrays are in their order."""
+
+    candidates: list[Candidate]
+    barred: MaskArray
+    """Ways that each of them bars, shape (n, ways)."""
+    clashes: MaskArray
+    """Which of them have no room beside each other, shape (n, n)."""
+
+    @classmethod
+    def of(cls, candidates: list[Candidate]) -> Pool:
+        """The pool of these candidates."""
+        barred = np.array([candidate.barred for candidate in candidates])
+        clashes = meeting_pairs([candidate.boxes for candidate in candidates], OBSTACLE_GAP)
+        mirrors = np.array([candidate.obstacle.kind == "mirror" for candidate in candidates])
+        return cls(candidates, barred, clashes | np.outer(mirrors, mirrors))  # MuJoCo draws one reflection only
+
+
+def draw_candidates(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> list[Candidate]:
+    """Obstacles that leave the free way, each as if it were alone."""
+    drawn = [
+        _draw_candidate(scenario, goal, index < _FIRST_CANDIDATES, goal.ways[rng.integers(len(goal.ways))], rng)
+        for index in range(_FIRST_CANDIDATES + _CANDIDATES)
+    ]
+    return [candidate for candidate in drawn if candidate is not None]
+
+
+def draw_across(scenario: Scenario, goal: Goal, view: View, rng: np.random.Generator) -> list[Candidate]:
+    """First obstacles that the first line of sight passes through."""
+    sight = goal.ways[view.first_sight]
+    drawn = [_draw_candidate(scenario, goal, True, sight, rng) for _ in range(_FIRST_CANDIDATES)]
+    through = (item for item in drawn if item is not None)
+    return [item for item in through if passes_through(item.obstacle.box, view.camera, goal.room.ends[0])]
+
+
+def bar_ways(scenario: Scenario, goal: Goal, view: View, pool: Pool) -> list[ObstacleSpec] | None:
+    """Obstacles out of the pool that bar all ways but those near the free one; None if there are none.
+
+    Those that bar most are taken, if they have room beside the others and do not hide the target.
+    """
+    hand = joined([hand_boxes(view.pose), *view.taken])
+    usable = np.array([not boxes_meet(item.boxes, hand, _START_ROOM) for item in pool.candidates])
+    for first, item in enumerate(pool.candidates):
+        if not (item.first and usable[first]):
+            continue
+        if scenario.through_sight and not passes_through(item.obstacle.box, view.camera, goal.room.ends[0]):
+            continue
+        indices = _covering(scenario, goal, view, pool, first, usable)
+        chosen = [pool.candidates[index] for index in indices]
+        if not chosen or (scenario.discovery and not _is_discovered(goal, view, chosen)):
+            continue
+        obstacles = [item.obstacle for item in chosen]
+        if visible_share(view.camera, goal.target, obstacles) >= _LEAST_VISIBLE:
+            return obstacles
+    return None
+
+
+def add_movers(
+    scenario: Scenario, goal: Goal, view: View, barriers: list[ObstacleSpec], rng: np.random.Generator
+) -> list[ObstacleSpec] | None:
+    """The obstacles with those that move; None if there is no room for them."""
+    count = int(rng.integers(scenario.moving_count[0], scenario.moving_count[1] + 1))
+    obstacles, hand = list(barriers), hand_boxes(view.pose)
+    taken = view.taken + [obstacle.boxes for obstacle in obstacles]
+    materials = [name for name in scenario.obstacle_materials if name != "mirror"]
+    for _ in range(_MOVER_TRIES):
+        if len(obstacles) == len(barriers) + count:
+            return obstacles
+        mover = draw_mover(scenario, _THING, str(rng.choice(materials)), goal.room.ends[-1], rng)
+        boxes = mover.boxes
+        if not goal.room.holds(boxes) or boxes_meet(boxes, joined(taken), OBSTACLE_GAP):
+            continue
+        if boxes_meet(boxes, hand, _START_ROOM):
+            continue
+        if visible_share(view.camera, goal.target, [*obstacles, mover]) >= _LEAST_VISIBLE:
+            obstacles.append(mover)
+            taken.append(boxes)
+    return None
+
+
+def _covering(scenario: Scenario, goal: Goal, view: View, pool: Pool, first: int, usable: MaskArray) -> list[int]:
+    """Indices of ``first`` and of those others that bar enough with it; none if they do not."""
+    least, most = scenario.obstacle_count
+    chosen, open_ways = [first], ~pool.barred[first]
+    left = usable & ~pool.clashes[first] & [not candidate.first for candidate in pool.candidates]
+    while len(chosen) < least or not _is_barred(open_ways, goal.near_free, view.first_sight):
+        gains = np.where(left, (pool.barred & open_ways).sum(axis=1), -1)
+        best = int(np.argmax(gains))
+        if len(chosen) == most or gains[best] < 0 or (gains[best] == 0 and len(chosen) >= least):
+            return []
+        chosen.append(best)
+        open_ways = open_ways & ~pool.barred[best]
+        left &= ~pool.clashes[best]
+        left[best] = False
+    return chosen
+
+
+def _is_barred(open_ways: MaskArray, near_free: MaskArray, first_sight: int) -> bool:
+    """Whether the first line of sight and enough of all other ways are barred, those from above in particular."""
+    above = (REACH_GRID[:, 1] > _ABOVE) & ~near_free
+    return bool(
+        not open_ways[first_sight]
+        and open_ways.mean() <= _MOST_OPEN
+        and (not above.any() or open_ways[above].mean() <= _MOST_ABOVE)
+    )
+
+
+def _is_discovered(goal: Goal, view: View, chosen: list[Candidate]) -> bool:
+    """Whether the nearest way that the first obstacle leaves is barred by something out of view at the start."""
+    nearness = np.where(chosen[0].barred | goal.near_free, -1.0, goal.ways @ goal.ways[view.first_sight])
+    natural = int(np.argmax(nearness))
+    first = [chosen[0].obstacle]
+    return any(item.barred[natural] and not is_seen(item.obstacle, view.pose, first) for item in chosen[1:])
+
+
+def _draw_candidate(
+    scenario: Scenario, goal: Goal, first: bool, way: FloatArray, rng: np.random.Generator
+) -> Candidate | None:
+    """An obstacle to bar ``way``, as near to the target as the free ways allow; None if it has no room."""
+    beyond = _beyond(goal.free.direction, way, rng.uniform(*_BEYOND))
+    drawn = draw_kind(scenario, first, float(beyond[2]), rng)
+    if drawn is None:
+        return None
+    kind, material = drawn
+    bearing = goal.free.azimuth if kind.around else math.atan2(-beyond[1], -beyond[0]) + rng.normal(0.0, 0.2)
+    nearest, farthest = kind.distance
+    obstacle = draw_obstacle(kind, material, goal.room.ends[-1], bearing, nearest, scenario, rng)
+    outward = bearing + math.pi if kind.around else bearing  # what stands around the target draws back from the way
+    boxes = obstacle.boxes
+    step = -_STEP_OUT * np.array([math.cos(outward), math.sin(outward), 0.0])
+    steps = goal.room.first_place(boxes, step, int((farthest - nearest) / _STEP_OUT))
+    if steps is None:
+        return None
+    boxes, obstacle = boxes.moved(steps * step), moved_out(obstacle, outward, steps * _STEP_OUT)
+    barred = ~free_directions(goal.room.ends[-1], boxes, goal.ways, -_BARRED_DEPTH)
+    return Candidate(obstacle, boxes, barred, first)
+
+
+def _beyond(free: FloatArray, way: FloatArray, angle: float) -> FloatArray:
+    """The direction that lies beyond ``way``, seen from the free one, by ``angle`` rad, but above the table.
+
+    What stands there bars the way without being in the free one: the hand is wide.
+    """
+    across = way - (way @ free) * free
+    across /= max(float(np.linalg.norm(across)), 1e-9)
+    total = math.acos(float(np.clip(way @ free, -1.0, 1.0))) + angle
+    direction = math.cos(total) * free + math.sin(total) * across
+    direction[2] = max(direction[2], 0.05)
+    return direction / np.linalg.norm(direction)

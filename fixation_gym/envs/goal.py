@@ -1,0 +1,130 @@
+"""What a scene begins with: the target, and the way to it that will stay free."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fixation_gym.control.corridor import approach_directions, box_set, hand_axes
+from fixation_gym.envs.config import Scenario
+from fixation_gym.envs.object_pool import target_shape
+from fixation_gym.envs.placement import Room, sample_push
+from fixation_gym.envs.reach import reachable_directions
+from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, TargetSpec
+from fixation_gym.types import FloatArray, MaskArray
+
+_PUSHED_REGION = ((0.46, 0.66), (-0.18, 0.18))
+"""Ranges of x and y in which a push may leave the target, in base, m."""
+_CONE = math.radians(5.0)
+"""Half angle of the cone of free ways, rad."""
+_NEAR_FREE = math.radians(12.0)
+"""Ways this near to the free one need not be barred, rad."""
+_LARGEST_ROLL, _LOW_ROLL = math.radians(45.0), math.radians(20.0)
+"""Largest turn of the hand that a grasp may need on a steep free way and on a low one, rad."""
+_SIDED = ("box", "duck")
+"""Targets that the fingers can close on from some sides only."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A straight way of the hand to the target: from where it comes."""
+
+    azimuth: float
+    """In base, rad: 0 comes from the robot's side along +x."""
+    elevation: float
+    """Above the table, rad."""
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector from the target to a camera on that way, shape (3,), in base."""
+        return approach_directions(np.array([self.azimuth]), np.array([self.elevation]))[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Target and free way."""
+
+    target: TargetSpec
+    free: Way
+    room: Room
+    ways: FloatArray
+    """Directions from the target, in the end, to cameras all over the reach, shape (n, 3)."""
+    near_free: MaskArray
+    """Those near the free way, shape (n,)."""
+
+
+def sample_goal(scenario: Scenario, free_angles: tuple[float, float], rng: np.random.Generator) -> Goal:
+    """Draw the target for a free way, given by its azimuth against the target's bearing and its elevation, rad."""
+    target = sample_target(scenario, rng)
+    if scenario.target_moves > 0.0 and rng.random() < scenario.target_moves:
+        target = _pushed(target, scenario, rng)
+    free = Way(math.atan2(target.position[1], target.position[0]) + free_angles[0], free_angles[1])
+    target = replace(target, yaw=_grasped_yaw(target, free, rng))
+    room = _room(target, free)
+    ways = reachable_directions(room.ends[-1])
+    return Goal(target, free, room, ways, ways @ free.direction > math.cos(_NEAR_FREE))
+
+
+def sample_target(scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
+    """Draw a red object somewhere in the target region."""
+    shape = target_shape(str(rng.choice(scenario.target_shapes)))
+    width = rng.uniform(*scenario.grasp_width)
+    ratio = width / (2.0 * shape.half_extent[1])
+    # Thin boxes and cylinders are taller than wide, so that oblique fingers reach them above the table.
+    slender = shape.name in ("box", "cylinder")
+    height_ratio = min(1.0, ratio * rng.uniform(1.0, 1.6)) if slender else ratio
+    length_ratio = min(1.0, ratio * rng.uniform(1.0, 1.3)) if shape.name == "box" else ratio
+    scale = (float(length_ratio), float(ratio), float(height_ratio))
+    x, y = (rng.uniform(*bounds) for bounds in TARGET_REGION)
+    z = TABLE_HEIGHT + shape.half_extent[2] * height_ratio
+    return TargetSpec(shape.name, scale, (float(x), float(y), float(z)), float(rng.uniform(-math.pi, math.pi)))
+
+
+def _pushed(target: TargetSpec, scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
+    """The target with a push that leaves it within reach."""
+    while True:
+        motion = sample_push(scenario.target_push, scenario.push_time, rng.uniform(-math.pi, math.pi), rng)
+        end = np.add(target.position[:2], motion.displacement)
+        if all(low < value < high for value, (low, high) in zip(end, _PUSHED_REGION, strict=True)):
+            return replace(target, motion=motion)
+
+
+def _grasped_yaw(target: TargetSpec, free: Way, rng: np.random.Generator) -> float:
+    """A yaw at which the fingers can close on the target from the free way; what is round may stand as it likes.
+
+    Flat fingers that are turned far would touch the table, so the lower the way the less the hand may turn.
+    """
+    if target.shape not in _SIDED:
+        return target.yaw
+    steepness = (free.elevation - math.radians(45.0)) / math.radians(25.0)
+    most = _LOW_ROLL + (_LARGEST_ROLL - _LOW_ROLL) * min(max(steepness, 0.0), 1.0)
+    # The fingers open along the image's x axis, which lies across the way, as does the target's y axis at this yaw.
+    quarters = int(rng.integers(4)) if target.shape == "box" else 2 * int(rng.integers(2))
+    yaw = free.azimuth + quarters * math.pi / 2 + rng.uniform(-most, most)
+    return float((yaw + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+def _room(target: TargetSpec, free: Way) -> Room:
+    """What obstacles must keep clear of: the target and a cone of free ways, its axis also for a turned hand."""
+    axis = free.direction
+    across = np.cross(axis, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    angles = np.linspace(0.0, 2.0 * math.pi, 6, endpoint=False)[:, None]
+    around = np.cos(angles) * across + np.sin(angles) * np.cross(axis, across)
+    rim = math.cos(_CONE) * axis + math.sin(_CONE) * around
+    turns = _grasp_turns(target, free)
+    ways = np.vstack([axis, rim, *[axis[None]] * len(turns)])
+    rolls = np.array([0.0] * (1 + len(rim)) + turns)
+    ends = target.places[[0, -1]] if target.motion else target.places[:1]
+    reds = box_set([replace(target.box, centre=place) for place in target.places])
+    return Room(reds, ends, hand_axes(ways, rolls))
+
+
+def _grasp_turns(target: TargetSpec, free: Way) -> list[float]:
+    """Turn of the hand about its axis that the grasp of a target with sides needs, rad; none for what is round."""
+    if target.shape not in _SIDED:
+        return []
+    period = math.pi / 2 if target.shape == "box" else math.pi
+    return [(free.azimuth - target.yaw + period / 2) % period - period / 2]
