@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fixation_gym.control import servo_laws
+from fixation_gym.control.reach import azimuth_range
 from fixation_gym.robot import TWIST_LIMITS
 from fixation_gym.types import FloatArray
 
@@ -32,10 +33,12 @@ class GazeGains:
     """Below this distance the gripper is turned across the target's narrow axis, m."""
     level_fade: float = 6.0
     """The hand is levelled fully while the gaze is off the vertical by more than 1 / ``level_fade`` rad."""
-    highest_elevation: float = math.radians(84.0)
+    highest_elevation: float = math.radians(86.0)
     """Elevation of the gaze at which the arm stops rising; beyond the vertical, up and down change places, rad."""
-    azimuth_range: tuple[float, float] = (math.radians(10.0), math.radians(78.0))
-    """Azimuths of the gaze, against the direction from base to target, that the arm reaches without strain, rad."""
+    lowest_elevation: float = math.radians(38.0)
+    """Elevation at which it stops sinking, rad."""
+    azimuth_slack: float = math.radians(4.0)
+    """How far beyond the arm's reach the camera may go around the target, rad."""
     search_rate: float = 0.35
     """Turning rate of the search, rad/s."""
     search_widening: float = 3.2
@@ -71,9 +74,15 @@ def within_reach(lateral: FloatArray, T_base_cam: FloatArray, target: FloatArray
     azimuth = math.atan2(gaze[1], gaze[0]) - math.atan2(target[1], target[0])
     azimuth = (azimuth + math.pi) % (2.0 * math.pi) - math.pi
     # Moving right (+x) around the target raises the azimuth, moving up (-y) raises the elevation.
-    low, high = gains.azimuth_range
-    v_x = max(lateral[0], 0.0) if azimuth < low else min(lateral[0], 0.0) if azimuth > high else lateral[0]
-    v_y = max(lateral[1], 0.0) if elevation(T_base_cam) > gains.highest_elevation else lateral[1]
+    height = elevation(T_base_cam)
+    low, high = azimuth_range(height)
+    slack = gains.azimuth_slack
+    v_x = lateral[0]
+    if azimuth < low - slack or azimuth > high + slack:
+        v_x = max(v_x, 0.0) if azimuth < low else min(v_x, 0.0)
+    v_y = lateral[1]
+    if height > gains.highest_elevation or height < gains.lowest_elevation:
+        v_y = max(v_y, 0.0) if height > gains.highest_elevation else min(v_y, 0.0)
     return np.array([v_x, v_y])
 
 

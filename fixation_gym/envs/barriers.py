@@ -16,11 +16,11 @@ from fixation_gym.control.corridor import (
     joined,
     meeting_pairs,
 )
+from fixation_gym.control.reach import REACH_GRID
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.goal import Goal
 from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS
 from fixation_gym.envs.placement import OBSTACLE_GAP, draw_kind, draw_mover, draw_obstacle, moved_out
-from fixation_gym.envs.reach import REACH_GRID
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
 from fixation_gym.envs.visibility import is_seen, passes_through, visible_share
 from fixation_gym.geometry.rigid import look_at

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fixation_gym.control.corridor import approach_directions, box_set, hand_axes
+from fixation_gym.control.reach import reachable_directions
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.placement import Room, sample_push
-from fixation_gym.envs.reach import reachable_directions
 from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, TargetSpec
 from fixation_gym.types import FloatArray, MaskArray
 

@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from fixation_gym.control.corridor import free_directions
+from fixation_gym.control.reach import sample_direction
 from fixation_gym.envs.barriers import Pool, View, add_movers, bar_ways, draw_across, draw_candidates
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.goal import Goal, Way, sample_goal, sample_target
 from fixation_gym.envs.placement import FREE_ROOM
 from fixation_gym.envs.pool_slots import fits_pool
-from fixation_gym.envs.reach import sample_direction
 from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
 from fixation_gym.envs.shapes import Vector
 from fixation_gym.types import FloatArray

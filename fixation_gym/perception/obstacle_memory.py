@@ -44,6 +44,12 @@ class MemorySettings:
     """Largest evidence of a point, in frames."""
     forget_below: float = 0.2
     """Points with less evidence are dropped, in frames."""
+    height_m: float = 0.02
+    """What stands behind the fixated object counts if it rises above the table by this, m, ..."""
+    height_sigmas: float = 2.5
+    """... by so many standard deviations of its inverse depth, ..."""
+    farthest: float = 1.6
+    """... and if it is not farther than so many times the fixated distance."""
     min_evidence: float = 5.0
     """Points with less are not believed yet, in frames."""
 
@@ -71,8 +77,12 @@ def remember(
     T_base_cam: FloatArray,
     time: float,
     settings: MemorySettings,
+    support_height_m: float | None = None,
 ) -> ObstacleMemory:
     """Add the evidence of one zero-flow test.
+
+    With a support height, what stands behind the fixated object is remembered as well: the test says how much nearer
+    or farther every pixel is, and from another side it is in front.
 
     Args:
         memory: what is remembered.
@@ -81,12 +91,13 @@ def remember(
         T_base_cam: camera pose at the time of the test, shape (4, 4).
         time: of the test, s.
         settings: how evidence is kept.
+        support_height_m: height of the table in base, m; None: unknown, then only what is in front is remembered.
     """
     tested, contradicted = _looked_at(memory, zero_flow, intrinsics, T_base_cam, settings)
     decay_s = np.where(tested, settings.decay_in_view_s, settings.decay_s)
     faded = memory.evidence * np.exp(-max(0.0, time - memory.time) / decay_s)
     faded = faded * np.where(contradicted, settings.contradiction, 1.0)
-    seen = _front_points(zero_flow, intrinsics, T_base_cam, settings)
+    seen = _standing_points(zero_flow, intrinsics, T_base_cam, settings, support_height_m)
     new_keys = np.unique(np.floor(seen / settings.voxel_m).astype(np.int64), axis=0)
     keys, index = np.unique(np.concatenate([memory.keys, new_keys]), axis=0, return_inverse=True)
     evidence = np.zeros(len(keys))
@@ -102,19 +113,61 @@ def believed_points(memory: ObstacleMemory, settings: MemorySettings) -> tuple[F
     return (memory.keys[believed] + 0.5) * settings.voxel_m, memory.evidence[believed]
 
 
-def _front_points(
-    zero_flow: ZeroFlow, intrinsics: Intrinsics, T_base_cam: FloatArray, settings: MemorySettings
+def _standing_points(
+    zero_flow: ZeroFlow,
+    intrinsics: Intrinsics,
+    T_base_cam: FloatArray,
+    settings: MemorySettings,
+    support_height_m: float | None,
 ) -> FloatArray:
-    """Points of the pixels that are surely in front, shape (n, 3), in base, m."""
-    front = zero_flow.supported & (zero_flow.p_nearer > settings.min_probability)
-    front &= zero_flow.inverse_depth_std < settings.max_relative_std * zero_flow.inverse_depth
-    # At an outline the flow's window mixes the thing with what is behind it; the thing is the nearest in sight there.
-    nearest = cv2.dilate(np.where(front, zero_flow.inverse_depth, np.float32(0.0)), _NEIGHBOURHOOD)
-    rows, columns = np.nonzero(front)
+    """Points of the pixels that surely show something that stands in the work space, shape (n, 3), in base, m."""
     x, y = intrinsics.grid
+    depth_std = zero_flow.inverse_depth_std
+    known = zero_flow.supported & (depth_std < settings.max_relative_std * zero_flow.inverse_depth)
+    standing = known & (zero_flow.p_nearer > settings.min_probability)
+    if support_height_m is not None:
+        surface = _inverse_depth_of(support_height_m + settings.height_m, T_base_cam, x, y)
+        with np.errstate(invalid="ignore"):
+            above = zero_flow.inverse_depth - settings.height_sigmas * depth_std > surface
+            near = zero_flow.inverse_depth > zero_flow.fixated_inverse_depth / settings.farthest
+        standing |= known & above & near
+    # At an outline the flow's window mixes the thing with what is behind it; the thing is the nearest in sight there.
+    nearest = cv2.dilate(np.where(standing, zero_flow.inverse_depth, np.float32(0.0)), _NEIGHBOURHOOD)
+    rows, columns = np.nonzero(standing)
     depth = 1.0 / nearest[rows, columns].astype(np.float64)
     rays = np.stack([x[rows, columns], y[rows, columns], np.ones(len(rows))], axis=-1)
     return transform(T_base_cam, rays * depth[:, None])
+
+
+def _inverse_depth_of(height: float, T_base_cam: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Inverse depth of a horizontal plane along the rays of pixels, shape (h, w), 1/m; not positive where they miss."""
+    rise = height - T_base_cam[2, 3]
+    return (T_base_cam[2, 0] * x + T_base_cam[2, 1] * y + T_base_cam[2, 2]) / min(rise, -1e-3)
+
+
+def seen_places(
+    places: FloatArray, zero_flow: ZeroFlow, intrinsics: Intrinsics, T_base_cam: FloatArray, slack: float
+) -> MaskArray:
+    """Which places, shape (n, 3), in base, m, are in view and not behind something, shape (n,).
+
+    Args:
+        places: to ask about.
+        zero_flow: the test of the present frame.
+        intrinsics: of its pixel grid.
+        T_base_cam: camera pose at its time, shape (4, 4).
+        slack: a thing hides a place if it is nearer by this share.
+    """
+    points = transform(inverse(T_base_cam), places)
+    with np.errstate(invalid="ignore"):
+        pixels = np.rint(intrinsics.project(points))
+        in_view = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
+    seen = np.zeros(len(places), dtype=np.bool_)
+    columns, rows = pixels[in_view].astype(np.int64).T
+    with np.errstate(invalid="ignore"):
+        hidden = zero_flow.supported & (zero_flow.inverse_depth > 0.0)
+        hidden_by = np.where(hidden, zero_flow.inverse_depth, np.float32(0.0))[rows, columns]
+    seen[in_view] = hidden_by * points[in_view, 2] < 1.0 + slack
+    return seen
 
 
 def _looked_at(

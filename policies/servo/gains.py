@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from fixation_gym.control.gaze import GazeGains
 from fixation_gym.control.open_loop import OpenLoopGains
+from fixation_gym.control.ways import WayCosts
 
 
 @dataclass(frozen=True)
@@ -23,16 +24,24 @@ class ServoGains:
     """lambda_Z of Eq. 7, m/s."""
     approach_speed: float = 0.11
     """Largest speed of the approach, m/s."""
-    climb_gain: float = 0.22
-    """lambda_dist of Eq. 8: speed upwards per metre of Z_f - Z_d, 1/s; grasps from above need less room."""
-    climb_until: float = math.radians(72.0)
-    """Elevation of the gaze above which the climb ends, rad."""
     cycle_amplitude: float = 0.02
     """Radius of the circle of Eq. 8, m."""
     cycle_rate: float = 2.0
     """Angular rate of the circle, rad/s."""
-    obstacle_gain: float = 0.10
-    """lambda_obs of Eq. 8: speed around obstacles, m/s."""
+    turn_gain: float = 2.5
+    """lambda_obs of Eq. 8: speed around the target per metre that the camera is off its way, 1/s."""
+    turn_speed: float = 0.13
+    """Largest speed around the target, m/s."""
+    orbit_distance: float = 0.43
+    """The camera goes around the target at this distance at least, m: farther out than what stands there."""
+    on_way: float = math.radians(7.0)
+    """Angle to its way within which the hand goes in, rad."""
+    seen_share: float = 0.6
+    """Share of a corridor that must have been looked at before the hand goes in ..."""
+    look_seconds: float = 1.5
+    """... or it has looked for so long, s."""
+    costs: WayCosts = field(default_factory=WayCosts)
+    """Of ways."""
     obstacle_margin: float = 0.005
     """Room to keep between hand and obstacles, m."""
     obstacle_evidence: float = 60.0
@@ -41,7 +50,7 @@ class ServoGains:
     """An obstacle nearer than this before the finger tips makes the hand retreat, m."""
     retreat_speed: float = 0.05
     """Speed of retreats, m/s."""
-    fixate_seconds: float = 1.5
+    fixate_seconds: float = 0.8
     """Shortest time of looking before the approach: obstacles have to move in the image to be seen, s."""
     fixate_relative_std: float = 0.05
     """Relative distance error below which the approach starts."""
@@ -55,11 +64,9 @@ class ServoGains:
     """After this many grasps it tries no other."""
     lost_seconds: float = 0.6
     """Time without sight of the target after which the robot looks for it, s."""
-    search_climb: float = 0.08
-    """Speed at which the search rises around the place where the target should be, to look from above, m/s."""
     search_distance: float = 0.40
     """The search backs off to this distance of that place, or of the table while there is none, m."""
     search_retreat_speed: float = 0.08
     """Speed of backing off, m/s."""
-    search_seconds: float = 5.0
+    search_seconds: float = 4.0
     """After this time the search looks elsewhere, too, s."""

@@ -11,11 +11,24 @@ import numpy as np
 from fixation_gym.control import gaze, open_loop, servo_laws
 from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
 from fixation_gym.control.open_loop import Manoeuvre, Stage, Target
-from fixation_gym.control.way_out import way_out
+from fixation_gym.control.ways import (
+    SeenSpace,
+    Ways,
+    chosen_way,
+    known_ways,
+    lateral_direction,
+    way_costs,
+)
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
 from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.grasp_axis import narrow_axis
-from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
+from fixation_gym.perception.obstacle_memory import (
+    MemorySettings,
+    ObstacleMemory,
+    believed_points,
+    remember,
+    seen_places,
+)
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
@@ -27,6 +40,10 @@ from policies.servo.phases import Phase, Situation, next_phase
 _FAR_OFF = 0.5
 """Offset from the image centre beyond which the direction to the target is all that counts, normalised coordinates."""
 
+_OWN_RADIUS = 0.05
+"""Points so near to the fixated point are the target's own, m."""
+_HIDING = 0.06
+"""A thing hides what is behind it if it is nearer by this share."""
 _ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 """Twist of a camera that turns about its optical axis, rad/s."""
 
@@ -34,7 +51,8 @@ _ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 class ServoPolicy:
     """The scripted baseline: gaze, approach and lateral laws (Eqs. 6-8), then an open-loop grasp.
 
-    State: perception, obstacle memory, phase, and the open-loop manoeuvre if there is one.
+    State: perception, obstacle memory, what was looked at, the way taken and those tried in vain, phase, and the
+    open-loop manoeuvre if there is one.
     """
 
     def __init__(
@@ -69,6 +87,11 @@ class ServoPolicy:
         self._last_seen = -math.inf
         self._manoeuvre: Manoeuvre | None = None
         self._grasps = 0
+        self._seen: SeenSpace | None = None
+        self._ways: Ways | None = None
+        self._way: int | None = None
+        self._on_way_since = math.inf
+        self._tried = np.zeros((0, 3))
         self.percept = self.estimate = None
 
     def act(self, obs: Mapping[str, Any]) -> Action:
@@ -116,22 +139,65 @@ class ServoPolicy:
         centred = float(np.linalg.norm(percept.fixation.centroid)) < self.gains.grasp_centred
         looking = centred and self._manoeuvre is None and self._phase is not Phase.SEARCH
         if looking and percept.flow.valid:
+            test, camera, T_base_cam = percept.zfc, percept.flow.intrinsics, percept.T_base_cam
             self._memory = remember(
                 self._memory,
-                percept.zfc,
-                percept.flow.intrinsics,
-                percept.T_base_cam,
+                test,
+                camera,
+                T_base_cam,
                 percept.flow.time,
                 self._memory_settings,
+                self._perception.support_height_m,
             )
+            target = percept.fixation.point_base
+            if self._seen is None:
+                self._seen = SeenSpace.empty(math.atan2(target[1], target[0]))
+            places = self._seen.places(target)
+            self._seen = self._seen.with_seen(seen_places(places, test, camera, T_base_cam, _HIDING))
+
+    def _obstacle_points(self, percept: Percept) -> tuple[FloatArray, FloatArray]:
+        """Points of obstacles that are believed, shape (n, 3), in base, m, and their evidence, shape (n,)."""
+        points, evidence = believed_points(self._memory, self._memory_settings)
+        others = np.linalg.norm(points - percept.fixation.point_base, axis=1) > _OWN_RADIUS
+        others &= self._avoid_obstacles
+        return points[others], evidence[others]
 
     def _obstacle_term(self, percept: Percept, T_base_cam: FloatArray) -> ObstacleTerm:
-        points, evidence = believed_points(self._memory, self._memory_settings)
-        if not self._avoid_obstacles:
-            points, evidence = points[:0], evidence[:0]
+        points, evidence = self._obstacle_points(percept)
         in_camera = transform(inverse(T_base_cam), points)
         depth = percept.fixation.distance_m
         return obstacle_term(in_camera, evidence, depth, TOOL_IN_CAMERA[2], self.gains.obstacle_margin)
+
+    def _choose_way(self, percept: Percept, T_base_cam: FloatArray, blocked: bool) -> tuple[FloatArray, float]:
+        """Lateral direction that leads to the way that is best now, and the angle to it, rad."""
+        gains, target = self.gains, percept.fixation.point_base
+        present = T_base_cam[:3, 3] - target
+        present /= np.linalg.norm(present)
+        if not self._avoid_obstacles or self._seen is None:
+            return np.zeros(2), 0.0
+        points, evidence = self._obstacle_points(percept)
+        self._ways = ways = known_ways(points, evidence, target, self._seen, 2.0 * gains.obstacle_margin)
+        near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
+        if blocked and near and self._way is not None and self._on_way_since < math.inf:
+            self._tried = np.vstack([self._tried, ways.directions[self._way]])
+            self._on_way_since = math.inf
+        cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs)
+        way = chosen_way(cost, self._way, gains.costs)
+        if way != self._way:
+            self._way, self._on_way_since = way, math.inf
+        direction, angle = lateral_direction(T_base_cam, present, ways.directions[way])
+        if angle < gains.on_way and self._on_way_since == math.inf:
+            self._on_way_since = percept.time
+        return direction, angle
+
+    def _may_enter(self, time: float) -> bool:
+        """Whether the hand may go in on its way: it was looked at, or looking longer did not help."""
+        if not self._avoid_obstacles:
+            return True
+        if self._ways is None or self._way is None:
+            return False
+        seen = 1.0 - float(self._ways.unseen[self._way])
+        return seen > self.gains.seen_share or time - self._on_way_since > self.gains.look_seconds
 
     # -- phases --------------------------------------------------------------------------------------------------
 
@@ -186,15 +252,19 @@ class ServoPolicy:
         return gaze.within_speed(twist)
 
     def _searching_twist(self, percept: Percept, T_base_cam: FloatArray) -> FloatArray:
-        """Rise and back off, gaze on the expected place: what hides it stands on the table. Then look around."""
+        """Back off and go on around to the chosen way, gaze on the expected place. Then look around."""
         gains, fixation = self.gains, percept.fixation
         seconds = percept.time - self._phase_start
         if seconds > gains.search_seconds:
             return gaze.searching_twist(seconds - gains.search_seconds, gains.gaze)
-        lateral = gaze.within_reach(np.array([0.0, -gains.search_climb]), T_base_cam, fixation.point_base, gains.gaze)
         support, distance = self._perception.support_height_m, fixation.distance_m
         if not fixation.initialised and support is not None:  # the target is somewhere on the table
             distance = (T_base_cam[2, 3] - support) / max(math.sin(gaze.elevation(T_base_cam)), 0.1)
+        lateral = np.zeros(2)
+        if fixation.initialised and self._way is not None:
+            direction, angle = self._choose_way(percept, T_base_cam, blocked=False)
+            lateral = direction * min(gains.turn_gain * distance * angle, gains.turn_speed)
+            lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
         back = -gains.search_retreat_speed if distance < gains.search_distance else 0.0
         expected = np.clip(fixation.centroid, -_FAR_OFF, _FAR_OFF) if fixation.initialised else np.zeros(2)
         level = gaze.levelling(T_base_cam, gains.gaze)
@@ -203,40 +273,42 @@ class ServoPolicy:
     def _fixating_twist(self, percept: Percept, T_base_cam: FloatArray, obstacle: ObstacleTerm) -> FloatArray:
         """Eqs. 6-8 together."""
         gains, fixation = self.gains, percept.fixation
-        approaching = self._phase is Phase.APPROACH
-        climb = gains.climb_gain if approaching and gaze.elevation(T_base_cam) < gains.climb_until else 0.0
         certainty = min(1.0, obstacle.evidence / gains.obstacle_evidence)
+        direction, angle = np.zeros(2), 0.0
+        if self._phase is Phase.APPROACH:
+            direction, angle = self._choose_way(percept, T_base_cam, certainty == 1.0)
+        near = min(1.0, max(0.2, (fixation.distance_m - 0.30) / (gains.orbit_distance - 0.30)))
+        speed = min(gains.turn_gain * fixation.distance_m * angle, gains.turn_speed)
+        if angle > gains.on_way:
+            speed *= near  # farther in, the hand must not swing into what stands beside its way
         lateral = servo_laws.lateral_velocity(
             fixation.distance_m,
             gains.desired_distance,
-            np.array([0.0, -climb]),
+            np.zeros(2),
             percept.time,
             gains.cycle_amplitude,
             gains.cycle_rate,
-            gains.obstacle_gain,
-            -certainty * self._way_out(percept, T_base_cam) if certainty > 0.0 else np.zeros(2),
+            -speed,
+            direction,
         )
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
-        v = np.array([*lateral, self._forward_speed(fixation.distance_m, obstacle, certainty)])
+        v = np.array([*lateral, self._forward_speed(percept, obstacle, certainty, angle)])
         roll_error = self._roll_error(percept, T_base_cam, certainty)
         return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, gains.gaze)
 
-    def _forward_speed(self, distance: float, obstacle: ObstacleTerm, certainty: float) -> float:
-        """v_Z, m/s: Eq. 7, the slower the surer it is that something is in the way; back off from what is close."""
-        gains = self.gains
+    def _forward_speed(self, percept: Percept, obstacle: ObstacleTerm, certainty: float, angle: float) -> float:
+        """v_Z, m/s: Eq. 7 on the way, the slower the surer it is that something is there; back off to go around."""
+        gains, distance = self.gains, percept.fixation.distance_m
         if certainty == 1.0 and obstacle.gap < gains.retreat_gap:
             return -gains.retreat_speed
         if self._phase is not Phase.APPROACH:
             return 0.0
+        if angle > gains.on_way or certainty == 1.0:
+            return -gains.retreat_speed if distance < gains.orbit_distance else 0.0
+        if not self._may_enter(percept.time):
+            return 0.0
         wanted = servo_laws.approach_speed(distance, gains.desired_distance, gains.approach_gain)
         return min(wanted, gains.approach_speed) * (1.0 - certainty)
-
-    def _way_out(self, percept: Percept, T_base_cam: FloatArray) -> FloatArray:
-        """Lateral unit vector towards the nearest direction that is free by a little more than needed, shape (2,)."""
-        gains, target = self.gains, percept.fixation.point_base
-        points, evidence = believed_points(self._memory, self._memory_settings)
-        margin = 2.0 * gains.obstacle_margin
-        return way_out(points, evidence, target, T_base_cam, gains.obstacle_evidence, margin, gains.gaze)
 
     def _roll_error(self, percept: Percept, T_base_cam: FloatArray, certainty: float) -> float:
         """Angle to turn about the optical axis, rad: level from afar, or if that frees the way of the hand.

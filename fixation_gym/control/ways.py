@@ -1,0 +1,168 @@
+"""Choice of the way: from which direction the hand comes in, by what was seen of every corridor and what was not.
+
+A way is a direction from the target to the camera. Its corridor is what the hand sweeps when it comes straight in. A
+way costs the turn to it, the evidence of obstacles in its corridor, and the part of its corridor that was never looked
+at; a way that was tried in vain costs more. The cheapest one is taken, and kept while none is clearly cheaper.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fixation_gym.control.corridor import in_corridor, level_axes
+from fixation_gym.control.reach import REACH_GRID, azimuth_range, directions
+from fixation_gym.types import FloatArray, MaskArray
+
+_RADII = (0.08, 0.13, 0.18, 0.23, 0.28)
+"""Distances from the target of the places that are looked at, m."""
+_TRIED_WITHIN = math.cos(math.radians(14.0))
+"""Cosine of the angle within which ways count as the one that was tried."""
+
+
+@dataclass(frozen=True)
+class WayCosts:
+    """What a way costs, in radians of turning."""
+
+    blocked: float = 0.9
+    """Per natural logarithm of its evidence, where that is enough to be sure."""
+    unseen: float = 0.8
+    """If nothing of its corridor was ever looked at."""
+    tried: float = 0.7
+    """Per time that it was tried in vain."""
+    change: float = 0.12
+    """A new way must be cheaper by this than the present one."""
+    strain: float = 0.15
+    """At the border of the arm's reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeenSpace:
+    """Which places around the target were looked at: not hidden, and within the image while the camera moved."""
+
+    bearing: float
+    """Of the target from the base, rad: the places turn with it."""
+    seen: MaskArray
+    """Shape (places,)."""
+
+    @classmethod
+    def empty(cls, bearing: float) -> SeenSpace:
+        """Nothing seen yet."""
+        return cls(bearing, np.zeros(len(_PLACES), dtype=bool))
+
+    def places(self, target: FloatArray) -> FloatArray:
+        """The places around a target, shape (places, 3), in base, m."""
+        c, s = math.cos(self.bearing), math.sin(self.bearing)
+        return target + _PLACES @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def with_seen(self, seen: MaskArray) -> SeenSpace:
+        """With more places seen."""
+        return replace(self, seen=self.seen | seen)
+
+    @property
+    def unseen_shares(self) -> FloatArray:
+        """Share of every way's corridor that was not looked at, shape (ways,)."""
+        return _IN_CORRIDORS @ (~self.seen).astype(np.float64) / _IN_CORRIDORS.sum(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """What is known of all ways to a target; rows are those of ``REACH_GRID``."""
+
+    directions: FloatArray
+    """Unit vectors from target to camera, shape (n, 3), in base."""
+    evidence: FloatArray
+    """Evidence of obstacles in every corridor, shape (n,)."""
+    unseen: FloatArray
+    """Share of every corridor that was never looked at, shape (n,)."""
+
+    def nearest(self, direction: FloatArray) -> int:
+        """Index of the way that is nearest to a direction."""
+        return int(np.argmax(self.directions @ direction))
+
+
+def known_ways(points: FloatArray, weights: FloatArray, target: FloatArray, seen: SeenSpace, margin: float) -> Ways:
+    """What was seen of every way.
+
+    Args:
+        points: remembered obstacle points in base, shape (n, 3), m.
+        weights: evidence of each point, shape (n,).
+        target: fixated point in base, shape (3,), m.
+        seen: which places were looked at.
+        margin: room to keep around the hand, m.
+    """
+    ways = directions(REACH_GRID, target)
+    evidence = np.zeros(len(ways))
+    if len(points):
+        axes = level_axes(ways)
+        local = np.einsum("kij,nj->kni", axes, points - target)
+        evidence = (in_corridor(local, margin) & (local[..., 2] < 0.0)) @ weights
+    return Ways(ways, evidence, seen.unseen_shares)
+
+
+def way_costs(ways: Ways, present: FloatArray, tried: FloatArray, full_weight: float, costs: WayCosts) -> FloatArray:
+    """What every way costs, shape (n,), in radians of turning.
+
+    Args:
+        ways: what is known of them.
+        present: unit vector from target to camera, shape (3,).
+        tried: ways that were tried in vain, shape (m, 3).
+        full_weight: evidence in a corridor at which it is surely blocked.
+        costs: the prices.
+    """
+    turn = np.arccos(np.clip(ways.directions @ present, -1.0, 1.0))
+    again = (ways.directions @ tried.T > _TRIED_WITHIN).sum(axis=1) if len(tried) else 0.0
+    blocked = costs.blocked * np.log1p(ways.evidence / full_weight)
+    return turn + blocked + costs.unseen * ways.unseen + costs.tried * again + costs.strain * _AT_BORDER
+
+
+def chosen_way(cost: FloatArray, before: int | None, costs: WayCosts) -> int:
+    """Index of the way to take; the one taken before stays unless another is clearly cheaper."""
+    best = int(np.argmin(cost))
+    return best if before is None or cost[best] < cost[before] - costs.change else before
+
+
+def lateral_direction(T_base_cam: FloatArray, present: FloatArray, way: FloatArray) -> tuple[FloatArray, float]:
+    """Direction across the optical axis that leads around the target to a way, and the angle to it.
+
+    Args:
+        T_base_cam: camera pose, shape (4, 4).
+        present: unit vector from target to camera, shape (3,).
+        way: the one to go to, shape (3,).
+
+    Returns:
+        Unit vector (x, y) in ``cam``, zero if there, and the angle in rad.
+    """
+    angle = math.acos(float(np.clip(present @ way, -1.0, 1.0)))
+    tangent = way - (way @ present) * present
+    lateral = T_base_cam[:3, :2].T @ tangent
+    return lateral / max(float(np.linalg.norm(lateral)), 1e-9), angle
+
+
+def _places() -> FloatArray:
+    """Places around a target with bearing 0, shape (n, 3), m: along all ways of the reach, and a ring beyond it."""
+    ways = directions(REACH_GRID, np.array([1.0, 0.0, 0.0]))
+    low = np.array([(azimuth, elevation) for elevation in (0.2, 0.45) for azimuth in np.linspace(-1.5, 3.2, 16)])
+    return np.concatenate([radius * np.vstack([ways, directions(low, np.array([1.0, 0.0, 0.0]))]) for radius in _RADII])
+
+
+def _in_corridors() -> FloatArray:
+    """Which places lie in the corridor of which way, shape (ways, places), as 0 or 1."""
+    axes = level_axes(directions(REACH_GRID, np.array([1.0, 0.0, 0.0])))
+    return in_corridor(np.einsum("kij,nj->kni", axes, _PLACES), 0.0).astype(np.float64)
+
+
+def _at_border() -> FloatArray:
+    """1 for ways at the border of the reach in azimuth, 0 within, shape (ways,)."""
+    border = []
+    for azimuth, elevation in REACH_GRID:
+        low, high = azimuth_range(float(elevation))
+        border.append(min(azimuth - low, high - azimuth) < 0.05)
+    return np.array(border, dtype=np.float64)
+
+
+_PLACES = _places()
+_IN_CORRIDORS = _in_corridors()
+_AT_BORDER = _at_border()
