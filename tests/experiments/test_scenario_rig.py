@@ -61,6 +61,36 @@ def test_see_through_things_have_a_surface_and_something_behind_it(rig) -> None:
     assert instance.bare
 
 
+def test_nothing_falls_or_touches_the_arm(rig) -> None:
+    for seed, (scene, variant) in enumerate([("opaque", "lateral"), ("mirror", "approach"), ("see_through", "border")]):
+        rng = np.random.default_rng(seed)
+        instance = rig.draw(scene, variant, rng)
+        bodies = (*rig.sim.obstacles, "target")
+        before = [rig.sim.body_position(body) for body in bodies]
+        for _ in rig.run(instance, rng):
+            pass
+        np.testing.assert_allclose([rig.sim.body_position(body) for body in bodies], before, atol=0.002)
+
+
+def test_places_part_the_picture_and_all_rules_are_asked_at_the_same_pixels(rig) -> None:
+    from fixation_gym.experiments.scenarios.rules import RULES
+    from fixation_gym.experiments.scenarios.scores import PLACES, pixel_counts, pixel_truth
+
+    instance, seen = looks(rig, "mirror", seconds=0.6)
+    answers = pixel_truth(rig, instance, rig.truth(seen[-1]), seen[-1].target_depth)
+    np.testing.assert_array_equal(sum(answers.places[place].astype(int) for place in PLACES), 1)
+    assert all(answers.places[place].sum() > 200 for place in PLACES)
+    counts = pixel_counts(seen[-1], answers)
+    assert set(counts) == set(RULES)
+    assert {tuple(counts[rule][f"on_{place}"] for place in PLACES) for rule in RULES} == {
+        tuple(counts["exact"][f"on_{place}"] for place in PLACES)
+    }
+    behind = counts["behind"]
+    assert behind["right"] == behind["asked"] - behind["front"]
+    plane = counts["plane"]  # the table tells itself
+    assert plane["on_table_right"] >= 0.99 * plane["on_table"]
+
+
 def test_a_moving_obstacle_moves_as_told(rig) -> None:
     instance, _ = looks(rig, "opaque", "moving", seconds=0.0)
     body = rig.sim.obstacles[instance.mover]

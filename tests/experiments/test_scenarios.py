@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from fixation_gym import cli
+from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
 from fixation_gym.errors import UsageError
+from fixation_gym.experiments.scenarios.rules import RULES, plane_front
 from fixation_gym.experiments.scenarios.run import CSV_FILE, RUNS_FILE, ScenariosConfig, cell_key, instance_rng, measure
 from fixation_gym.experiments.scenarios.scenes import (
     CIRCLE_RADIUS,
@@ -23,7 +25,9 @@ from fixation_gym.experiments.scenarios.scenes import (
 )
 from fixation_gym.experiments.scenarios.statistics import bootstrap_ratio, format_table, summarise
 from fixation_gym.experiments.scenarios.view import MARGIN, SceneView
+from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, look_at, transform
+from fixation_gym.perception.region_vote import VoteSettings
 
 
 def view_of(instance: Instance) -> SceneView:
@@ -33,39 +37,87 @@ def view_of(instance: Instance) -> SceneView:
     return SceneView(pose, scene.target, depth)
 
 
+def asked(instance: Instance) -> tuple[ObstacleSpec, ...]:
+    """All obstacles but the stand under the target."""
+    return instance.scene.obstacles[: instance.stand]
+
+
 @pytest.mark.parametrize(
     ("scene", "variant"),
     [(scene, variant) for scene in SCENES[:3] for variant in VARIANTS] + [("reflection", "border")],
 )
 def test_every_instance_shows_what_its_scene_promises(scene, variant):
     instance = sample_instance(scene, variant, np.random.default_rng(7))
-    view = view_of(instance)
-    kinds = [obstacle.kind for obstacle in instance.scene.obstacles]
+    view, obstacles = view_of(instance), asked(instance)
     expected = {
         "opaque": ["opaque"] * 4,
         "see_through": ["translucent", "opaque"],
-        "mirror": ["mirror", "opaque", "opaque"],
+        "mirror": ["mirror", "opaque", "opaque", "opaque"],
         "reflection": ["mirror", "opaque"],
     }
-    assert kinds == expected[scene]
-    depths = [view.depths(obstacle) for obstacle in instance.scene.obstacles]
+    assert [obstacle.kind for obstacle in obstacles] == expected[scene]
+    depths = [view.sight(obstacle).depths for obstacle in obstacles]
     assert depths[0].max() < 1.0 - MARGIN
     assert scene == "reflection" or depths[-1].min() > 1.0 + MARGIN
     if scene == "see_through" and variant != "border":
-        assert view.is_across(instance.scene.obstacles[0])
-    first = transform(inverse(view.T_base_cam), np.array(instance.scene.obstacles[0].position))
-    assert variant != "border" or abs(first[0] / first[2]) > 0.29
-    solid = [obstacle.texture for obstacle in instance.scene.obstacles if obstacle.kind == "opaque"]
+        assert view.is_across(obstacles[0])
+    if variant == "border":
+        assert np.abs(view.sight(obstacles[0]).places[:, 0]).max() > 0.29
+    solid = [obstacle.texture for obstacle in obstacles if obstacle.kind == "opaque"]
     assert variant != "plain" or set(solid) <= {"wood_plain"}
     assert instance.bare == (variant == "plain" and scene == "see_through")
     assert (instance.mover is not None) == (variant == "moving")
     assert 0.0199 < math.hypot(*instance.velocity) < 0.101 or variant != "moving"
 
 
+def test_what_holds_the_target_up_reaches_from_the_table_to_it():
+    for seed in range(6):
+        instance = sample_instance("see_through", "lateral", np.random.default_rng(seed))
+        target = instance.scene.target.box
+        low = target.centre[2] - target.half_extent[2]
+        if instance.stand is None:
+            assert low == pytest.approx(TABLE_HEIGHT)
+            continue
+        stand = instance.scene.obstacles[instance.stand]
+        assert stand.position[2] - stand.shape.half_extent[2] == pytest.approx(TABLE_HEIGHT)
+        assert stand.position[2] + stand.shape.half_extent[2] == pytest.approx(low)
+        assert 0.05 <= low - TABLE_HEIGHT <= 0.15
+
+
+def test_the_plane_is_in_front_where_the_table_is_nearer_than_the_target():
+    camera = Intrinsics.from_fovy(30, 40, 0.7)
+    pose = look_at(np.array([0.0, 0.0, 1.2]), np.array([1.0, 0.0, 0.2]), np.array([0.0, 0.0, 1.0]))
+    front = plane_front(pose, camera, table_height=0.2, inverse_distance=1.0 / math.sqrt(2.0))
+    np.testing.assert_array_equal(front, camera.grid[1] > 0.0)  # the table is in the image's middle at that distance
+    assert not plane_front(pose, camera, 0.2, 1.0 / 0.5).any()  # the target is held up near the camera
+    level = look_at(np.array([0.0, 0.0, 1.2]), np.array([1.0, 0.0, 1.2]), np.array([0.0, 0.0, 1.0]))
+    assert not plane_front(level, camera, 0.2, 1e-3)[:15].any()  # lines of sight that rise never meet the table
+
+
+def test_neither_the_table_nor_the_place_in_the_image_tells_the_sides():
+    settings = VoteSettings()
+    rows: dict[bool, list[float]] = {True: [], False: []}
+    right = []
+    for scene in SCENES[:3]:
+        for variant in ("lateral", "border", "plain"):
+            for seed in range(4):
+                instance = sample_instance(scene, variant, np.random.default_rng(seed))
+                view = view_of(instance)
+                for obstacle in asked(instance):
+                    sight = view.sight(obstacle)
+                    in_front = bool(np.median(sight.depths) < 1.0)
+                    assert in_front or sight.low_share == 0.0  # above the table it cannot be otherwise
+                    rows[in_front].append(float(np.median(sight.places[:, 1])))
+                    right.append((sight.low_share >= settings.front_share) == in_front)
+    assert 0.4 < np.mean(right) < 0.6
+    assert 0.4 < len(rows[True]) / len(right) < 0.6
+    assert abs(np.median(rows[True]) - np.median(rows[False])) < 0.08
+
+
 def test_a_reflected_thing_has_its_image_behind_the_target_in_the_direction_of_the_mirror():
     for seed in range(3):
         instance = sample_instance("reflection", "border", np.random.default_rng(seed))
-        view, (mirror, solid) = view_of(instance), instance.scene.obstacles
+        view, (mirror, solid) = view_of(instance), asked(instance)
         normal = np.array([math.cos(mirror.yaw), math.sin(mirror.yaw), 0.0])
         offset = np.array(solid.position) - mirror.position
         assert offset @ normal > 0.0  # before the mirror's face
@@ -89,6 +141,7 @@ def test_the_camera_circles_and_approaches_as_fast():
 
 def counts(right: int) -> dict[str, int]:
     halves = {"front": 40, "front_called": 38, "called": 40, "image": 0, "image_behind": 0}
+    halves |= {"on_obstacle": 20, "on_obstacle_right": right // 5, "on_room": 80, "on_room_right": right - right // 5}
     return {"asked": 100, "right": right, "inner": 80, "inner_right": min(80, right), **halves}
 
 
@@ -105,11 +158,11 @@ def fake_run(cell):
         "side": "front",
         "nearness": 0.6,
         "pixels": 300.0,
-        "verdicts": {"paper": {"unknown": 10}, "exact": {"front": 9, "unknown": 1}},
-        "final": {"paper": "unknown", "exact": "front"},
-        "first_call_s": {"paper": None, "exact": 0.08 if cell["seed"] % 2 else 0.6},
+        "verdicts": {rule: {"unknown": 10} for rule in RULES} | {"exact": {"front": 9, "unknown": 1}},
+        "final": dict.fromkeys(RULES, "unknown") | {"exact": "front"},
+        "first_call_s": dict.fromkeys(RULES) | {"exact": 0.08 if cell["seed"] % 2 else 0.6},
     }
-    rules = {"paper": counts(70), "exact": counts(99)}
+    rules = {"plane": counts(50), "behind": counts(40), "paper": counts(70), "exact": counts(99)}
     scores = {"pixels": 120, "unknown": 20, "falsely_moving": 1, "distance_error": 0.01}
     return {**cell, "frames": 10, "rules": rules, "objects": [item], **scores}
 
@@ -121,6 +174,10 @@ def test_a_run_gives_rows_votes_and_alarms_and_resumes(tmp_path):
         rows = {(row["variant"], row["rule"]): row for row in summary["scenes"][scene]}
         assert rows["all", "exact"]["sign_accuracy"] == pytest.approx(0.99)
         assert rows["all", "paper"]["sign_accuracy"] == pytest.approx(0.70)
+        assert rows["all", "plane"]["sign_accuracy"] == pytest.approx(0.50)
+        assert rows["all", "exact"]["obstacle_sign_accuracy"] == pytest.approx(0.95)
+        assert rows["all", "exact"]["room_sign_accuracy"] == pytest.approx(1.0)
+        assert rows["all", "exact"]["table_sign_accuracy"] is None
         assert rows["plain", "exact"]["front_recall"] == pytest.approx(0.95)
         assert rows["plain", "exact"]["image_behind"] is None
         assert rows["all", "exact"]["object_vote_accuracy"] == 1.0
@@ -132,11 +189,13 @@ def test_a_run_gives_rows_votes_and_alarms_and_resumes(tmp_path):
     assert summary["clear"]["minutes"] == pytest.approx(1.0)
     assert summary["clear"]["map_alarms_per_minute"] == pytest.approx(4.0)
     assert summary["clear"]["path_alarms"] == 0
-    assert "exact" in format_table(summary)
+    assert [row["instances"] for row in summary["scenes"]["all"]] == [40] * len(RULES)
+    assert all(rule in format_table(summary) for rule in RULES)
     with (tmp_path / CSV_FILE).open() as file:
         table = list(csv.DictReader(file))
-    assert len(table) == 4 * 6 * 2
-    assert float(table[0]["sign_accuracy_ci95_low"]) == pytest.approx(0.70)
+    assert len(table) == (4 * 6 + 1) * len(RULES)
+    paper = RULES.index("paper")
+    assert float(table[paper]["sign_accuracy_ci95_low"]) == pytest.approx(0.70)
 
     lines = (tmp_path / RUNS_FILE).read_text().splitlines(keepends=True)
     (tmp_path / RUNS_FILE).write_text("".join(lines[:5]) + lines[5][:20])  # killed while writing
@@ -180,7 +239,7 @@ def test_the_command_line_ends_with_one_line_on_bad_input(capsys):
 
 
 def test_runs_in_which_the_target_was_never_seen_leave_the_distance_error_out():
-    rules = {rule: {"right": 1, "asked": 1} for rule in ("paper", "exact")}
+    rules = {rule: {"right": 1, "asked": 1} for rule in RULES}
     run = {"scene": "opaque", "variant": "lateral", "rules": rules, "objects": [], "unknown": 0, "pixels": 1}
     runs = [run | {"falsely_moving": 0, "distance_error": error} for error in (None, 0.02, 0.01)]
     row = summarise(runs)["scenes"]["opaque"][0]

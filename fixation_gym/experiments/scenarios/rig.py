@@ -28,6 +28,8 @@ _GAZE_GAIN, _ROLL_GAIN = 4.0, 1.5
 """1/s."""
 _LEAST_AREA = 0.001
 """Share of the image that the target must cover at the start, or the instance is drawn again."""
+_ARM_ROOM = 0.02
+"""Least distance between arm and obstacles at the start, m."""
 _TRIES = 40
 
 
@@ -69,6 +71,12 @@ class ScenarioRig:
         self._truth = _SceneTruth(self.sim.model, self.perception.flow_intrinsics)
         self.owners = tuple(self.sim.model.body(body).name for body in self.sim.model.geom_bodyid)
         """Name of the body of every geom."""
+        names = [self.sim.model.geom(geom).name for geom in range(self.sim.model.ngeom)]
+        self.is_table = np.array(self.owners) == "table"
+        """Which geoms are the table or lie flat on it, shape (ngeom,)."""
+        self.is_table |= np.char.startswith(np.array(names), "sheet")
+        self.thing_geoms: list[list[int]] = []
+        """Geoms of every obstacle of the scene, without what holds it up."""
 
     def draw(self, scene: str, variant: str, rng: np.random.Generator) -> Instance:
         """Draw an instance that the arm can reach and whose target is in view, and reset the simulation to it.
@@ -82,6 +90,8 @@ class ScenarioRig:
                 self._reset(instance)
             except RuntimeError:  # no room for the scene in this view, or out of the arm's reach
                 continue
+            if self.sim.clearance() < _ARM_ROOM:
+                continue
             seen = segment(self._image(self.sim.data.qpos), INTRINSICS)
             if seen.visible and seen.area_fraction > _LEAST_AREA and np.linalg.norm(seen.centroid) < 0.06:
                 return instance
@@ -91,9 +101,11 @@ class ScenarioRig:
         self.sim.reset(instance.scene)
         self._mirror = any(obstacle.kind == "mirror" for obstacle in instance.scene.obstacles)
         model = self.sim.model
+        things = zip(self.sim.obstacles, instance.scene.obstacles, strict=True)
+        self.thing_geoms = [[model.geom(name).id for name in _thing_parts(body, thing)] for body, thing in things]
         if instance.bare:
             for body, obstacle in zip(self.sim.obstacles, instance.scene.obstacles, strict=True):
-                for name, _ in _trimmings(body, obstacle):
+                for name in _trimmings(body, obstacle):
                     model.geom_group[model.geom(name).id] = HIDDEN_GROUP
         if instance.mover is not None:  # neither contacts nor weight, so that it keeps its velocity
             body = model.body(self.sim.obstacles[instance.mover]).id
@@ -154,10 +166,17 @@ class ScenarioRig:
         self._truth.close()
 
 
-def _trimmings(body: str, obstacle: ObstacleSpec) -> list[tuple[str, int]]:
-    """Names and indices of the rims and labels of an obstacle."""
+def _thing_parts(body: str, obstacle: ObstacleSpec) -> list[str]:
+    """Names of the parts of an obstacle without what holds it up, if it is not of the same matter."""
     parts = enumerate(obstacle.shape.parts)
-    return [(obstacle_part_name(body, index), index) for index, part in parts if part.finish in ("rim", "label")]
+    opaque = obstacle.kind == "opaque"
+    return [obstacle_part_name(body, index) for index, part in parts if opaque or part.finish != "solid"]
+
+
+def _trimmings(body: str, obstacle: ObstacleSpec) -> list[str]:
+    """Names of the rims and labels of an obstacle."""
+    parts = enumerate(obstacle.shape.parts)
+    return [obstacle_part_name(body, index) for index, part in parts if part.finish in ("rim", "label")]
 
 
 def _command(instance: Instance, time: float, percept: Percept, observation: Observation) -> FloatArray:

@@ -1,28 +1,30 @@
-"""Scores of one look at a hard scene: the signs of single pixels and the verdicts on whole obstacles, both rules.
+"""Scores of one look at a hard scene: the signs of single pixels and the verdicts on whole obstacles, all rules.
 
 Pixels are asked "nearer than the fixated object?", the table included, as the paper's rule knows no table. A pixel
 counts if its true depth differs from Z_f by more than 10 % and what it shows is one thing that stands still: not where
 see-through things show something on the other side, not the robot in a mirror, nothing that moves. On a mirror's face
-the truth is the virtual image. Obstacles count with their surface; see-through things and mirrors are obstacles.
+the truth is the virtual image. Obstacles count with their surface; see-through things and mirrors are obstacles, and
+so is the stand under the fixated object, about which no vote is held. All rules are asked at the same pixels.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
 
+from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.envs.truth_view import Truth
 from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
+from fixation_gym.experiments.scenarios.rules import Rule, plane_front
 from fixation_gym.experiments.scenarios.scenes import Instance
 from fixation_gym.perception.dot_product_rule import dot_product_front
 from fixation_gym.perception.region_vote import VoteSettings, region_votes
 from fixation_gym.types import FloatArray, MaskArray
 
-Rule = Literal["paper", "exact"]
-RULES: tuple[Rule, ...] = ("paper", "exact")
+PLACES = ("obstacle", "table", "room")
+"""What pixels show, by what stands there; a mirror is an obstacle, whatever it shows."""
 DEPTH_MARGIN = 0.10
 INNER_PX = 3
 """Inner pixels are farther than this from depth edges, px of the flow grid: 6 px of the frames that flow is made of."""
@@ -43,6 +45,8 @@ class PixelTruth:
     """Virtual images of static things that lie clearly behind the fixated object."""
     image_of_obstacle: MaskArray
     """Those of obstacles."""
+    places: dict[str, MaskArray]
+    """Pixels of each of ``PLACES``."""
     regions: dict[int, MaskArray]
     """Visible pixels of each obstacle, by its index in the scene."""
 
@@ -64,12 +68,14 @@ def pixel_truth(rig: ScenarioRig, instance: Instance, truth: Truth, target_depth
     edges = _edges(depth) | _edges(truth.depth)
     near_edge = cv2.dilate(edges.astype(np.uint8), np.ones((2 * INNER_PX + 1, 2 * INNER_PX + 1), np.uint8))
     image = on_mirror & (side < 0.0)
+    on_obstacle, on_table = np.char.startswith(owner, "obstacle"), np.append(rig.is_table, False)[truth.geom]
     return PixelTruth(
         side=side,
         inner=near_edge == 0,
         image=image,
         image_of_obstacle=image & np.char.startswith(image_owner, "obstacle"),
-        regions={index: owner == body for index, body in enumerate(rig.sim.obstacles)},
+        places=dict(zip(PLACES, (on_obstacle, on_table, ~on_obstacle & ~on_table), strict=True)),
+        regions={index: np.isin(truth.geom, geoms) for index, geoms in enumerate(rig.thing_geoms)},
     )
 
 
@@ -94,10 +100,15 @@ def _edges(depth: FloatArray) -> MaskArray:
 
 def calls(look: Look) -> dict[Rule, MaskArray]:
     """Pixels that each rule calls nearer, shape (h, w); only those that are ``supported`` count."""
-    percept = look.percept
+    percept, zfc = look.percept, look.percept.zfc
     with np.errstate(invalid="ignore"):
-        exact = percept.zfc.inverse_depth > percept.zfc.fixated_inverse_depth
-    return {"paper": dot_product_front(percept.flow, look.twist), "exact": exact}
+        exact = zfc.inverse_depth > zfc.fixated_inverse_depth
+    return {
+        "plane": plane_front(percept.T_base_cam, percept.flow.intrinsics, TABLE_HEIGHT, zfc.fixated_inverse_depth),
+        "behind": np.zeros_like(exact),
+        "paper": dot_product_front(percept.flow, look.twist),
+        "exact": exact,
+    }
 
 
 def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
@@ -126,16 +137,19 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
             "image_of_obstacle": count(asked & truth.image_of_obstacle),
             "image_of_obstacle_behind": count(asked & truth.image_of_obstacle & ~called),
             "pixels": count(truth.side != 0.0),
+            **{f"on_{place}": count(asked & mask) for place, mask in truth.places.items()},
+            **{f"on_{place}_right": count(asked & mask & right) for place, mask in truth.places.items()},
         }
     return result
 
 
 def votes(look: Look, region: MaskArray, settings: VoteSettings) -> dict[Rule, tuple[float, float]]:
-    """Votes for front and behind in a region, by each rule; the paper's has neither probability nor own motion."""
+    """Votes for front and behind in a region, by each rule; only the exact one has probability and own motion."""
     zfc = look.percept.zfc
     supported = zfc.supported & region
-    paper = int(np.count_nonzero(supported & calls(look)["paper"]))
-    return {
-        "paper": (float(paper), float(np.count_nonzero(supported) - paper)),
-        "exact": region_votes(zfc, region, settings),
-    }
+    result: dict[Rule, tuple[float, float]] = {}
+    for rule, called in calls(look).items():
+        front = int(np.count_nonzero(supported & called))
+        result[rule] = float(front), float(np.count_nonzero(supported) - front)
+    result["exact"] = region_votes(zfc, region, settings)
+    return result

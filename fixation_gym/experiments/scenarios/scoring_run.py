@@ -11,11 +11,11 @@ import numpy as np
 from fixation_gym.control.obstacle_term import obstacle_term
 from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
+from fixation_gym.experiments.scenarios.rules import RULES
 from fixation_gym.experiments.scenarios.scenes import CLEAR, Instance
 from fixation_gym.experiments.scenarios.scores import (
     DEPTH_MARGIN,
     LEAST_REGION_PX,
-    RULES,
     PixelTruth,
     pixel_counts,
     pixel_truth,
@@ -110,8 +110,8 @@ def _ask(record: _Record, look: Look, answers: PixelTruth, index: int, depth: np
 
 
 def _described(obstacle: ObstacleSpec, record: _Record, instance: Instance, index: int) -> dict[str, Any] | None:
-    """All about one obstacle; None if it was hardly visible or is not clearly on one side."""
-    if not record.sides:
+    """All about one obstacle; None if it was hardly visible, is not clearly on one side, or holds the target up."""
+    if not record.sides or index == instance.stand:
         return None
     nearness = float(np.median(record.sides))
     if abs(nearness - 1.0) < DEPTH_MARGIN:

@@ -8,17 +8,21 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.evaluation.statistics import mean, median, wilson_interval
+from fixation_gym.experiments.scenarios.rules import RULES
 from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
 
 Run = Mapping[str, Any]
-RULES = ("paper", "exact")
 MEASURES = {
     "sign_accuracy": ("right", "asked"),
+    "obstacle_sign_accuracy": ("on_obstacle_right", "on_obstacle"),
+    "table_sign_accuracy": ("on_table_right", "on_table"),
+    "room_sign_accuracy": ("on_room_right", "on_room"),
     "inner_sign_accuracy": ("inner_right", "inner"),
     "front_recall": ("front_called", "front"),
     "front_precision": ("front_called", "called"),
     "image_behind": ("image_behind", "image"),
     "inner_image_behind": ("inner_image_behind", "inner_image"),
+    "obstacle_share": ("on_obstacle", "asked"),
 }
 """Ratios of pixel counts summed over the instances; pixels without evidence do not count."""
 FIRST_CALL_S = 0.5
@@ -26,6 +30,9 @@ _RESAMPLES = 1000
 ALL = "all"
 
 OBJECT_GROUPS: dict[str, Callable[[Mapping[str, Any]], bool]] = {
+    "all": lambda o: True,
+    "all in front": lambda o: o["side"] == "front",
+    "all behind": lambda o: o["side"] == "behind",
     "opaque, in front": lambda o: o["kind"] == "opaque" and o["side"] == "front" and not o["moves"],
     "opaque, behind": lambda o: o["kind"] == "opaque" and o["side"] == "behind" and not o["moves"],
     "see-through, alpha >= 0.7 or with rim or label": lambda o: (
@@ -42,7 +49,7 @@ OBJECT_GROUPS: dict[str, Callable[[Mapping[str, Any]], bool]] = {
 
 
 def summarise(runs: Sequence[Run]) -> dict[str, Any]:
-    """Rows per scene, votes per kind of obstacle, and false alarms, JSON-able."""
+    """Rows per scene and over all, votes per kind of obstacle, and false alarms, JSON-able."""
     scored = [run for run in runs if run["scene"] != CLEAR]
     scenes = {}
     for scene in SCENES:
@@ -52,6 +59,7 @@ def summarise(runs: Sequence[Run]) -> dict[str, Any]:
             for variant in (*VARIANTS, ALL)
             for rule in RULES
         ]
+    scenes[ALL] = [_row(ALL, scored, rule) for rule in RULES]
     objects = [item for run in scored for item in run["objects"]]
     groups = [
         _group(name, [item for item in objects if belongs(item)], rule)
@@ -151,33 +159,33 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-_COLUMNS = (
-    *("sign_accuracy", "inner_sign_accuracy"),
-    *("front_recall", "front_precision", "inner_image_behind"),
-)
+_COLUMNS = {
+    "sign": "sign_accuracy",
+    **{place: f"{place}_sign_accuracy" for place in ("obstacle", "table", "room")},
+    "inner": "inner_sign_accuracy",
+    "recall": "front_recall",
+    "precision": "front_precision",
+    "images": "inner_image_behind",
+    "votes": "object_vote_accuracy",
+}
 
 
 def format_table(summary: Mapping[str, Any]) -> str:
-    """Plain-text tables: pixels per scene and variant, paper's rule / exact; obstacles; false alarms."""
-    header = (
-        f"{'scene':12}{'variant':10}"
-        + "".join(f"{name.replace('sign_accuracy', 'sign'):>22}" for name in _COLUMNS)
-        + f"{'votes':>14}{'unknown':>9}"
-    )
-    lines = [f"{header}   (paper / exact)", "-" * len(header)]
+    """Plain-text tables: a line per scene, variant and rule; votes on obstacles by each rule; false alarms."""
+    header = f"{'scene':12}{'variant':10}{'rule':8}" + "".join(f"{name:>10}" for name in _COLUMNS) + f"{'unknown':>10}"
+    lines = [header, "-" * len(header)]
     for scene, rows in summary["scenes"].items():
-        for paper, exact in zip(rows[::2], rows[1::2], strict=True):
-            values = [f"{_number(paper[name])} / {_number(exact[name])}" for name in _COLUMNS]
-            votes = f"{_number(paper['object_vote_accuracy'], 2)} / {_number(exact['object_vote_accuracy'], 2)}"
-            cells = "".join(f"{value:>22}" for value in values)
-            lines.append(f"{scene:12}{exact['variant']:10}{cells}{votes:>14}{_number(exact['unknown_fraction'], 2):>9}")
-    lines.append("")
+        for row in rows:
+            cells = "".join(f"{_number(row[name]):>10}" for name in (*_COLUMNS.values(), "unknown_fraction"))
+            lines.append(f"{scene:12}{row['variant']:10}{row['rule']:8}{cells}")
+    lines += ["", f"{'obstacles':48}{'rule':8}  voted right"]
     for row in summary["objects"]:
-        if row["rule"] == "exact" and row["objects"]:
+        if row["objects"]:
             low, high = row["vote_ci95"]
             called = ", ".join(f"{row[f'called_{side}']} {side}" for side in ("front", "behind", "unknown"))
             first = f"in front within {FIRST_CALL_S} s: {_number(row['first_call_in_time'], 2)}"
-            lines.append(f"{row['group']:48}{row['vote_accuracy']:.2f} [{low:.2f}, {high:.2f}]  {called};  {first}")
+            votes = f"{row['vote_accuracy']:.2f} [{low:.2f}, {high:.2f}]"
+            lines.append(f"{row['group']:48}{row['rule']:8}  {votes}  {called};  {first}")
     clear = summary["clear"]
     lines.append(
         f"\nclear: {clear['minutes']:.1f} min, {clear['map_alarms']} false alarms in the map, "

@@ -1,23 +1,47 @@
-"""From where an instance of a hard scene is looked at, and what stands where in that view. Knows no simulator."""
+"""From where an instance of a hard scene is looked at, and what is seen of a thing there. Knows no simulator."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
-from fixation_gym.control.corridor import approach_directions
+from fixation_gym.control.corridor import approach_directions, boxes_meet, hand_boxes
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, ObstacleSpec, TargetSpec
-from fixation_gym.geometry.rigid import inverse, look_at, transform
+from fixation_gym.experiments.scenarios.rules import plane_front
+from fixation_gym.geometry.boxes import BoxSet
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import look_at
+from fixation_gym.robot import CAMERA_FOVY
 from fixation_gym.types import FloatArray
 
 MARGIN = 0.12
 """What is clearly nearer or farther than the target differs by this share of its depth."""
-_VISIBLE_Y = 0.36
-"""Vertical image position of things, normalised; the image ends at 0.39."""
+_HAND_GAP = 0.04
+"""Between things and the hand, m: it circles."""
+_EYES = Intrinsics.from_fovy(27, 36, CAMERA_FOVY)
+"""Lines of sight along which things are looked for; as many pixels as that are enough to tell shares."""
+_RAYS = np.stack([*_EYES.grid, np.ones((_EYES.height, _EYES.width))], axis=-1).reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What is seen of one thing when nothing else is there."""
+
+    depths: FloatArray
+    """Of the lines of sight that meet it, relative to the target's, shape (n,)."""
+    places: FloatArray
+    """Where they are in the image, normalised, shape (n, 2)."""
+    low_share: float
+    """Share of them for which the table alone says "in front": there its plane is nearer than the target."""
+
+    def is_clearly(self, in_front: bool) -> bool:
+        """Whether all that is seen is nearer, or farther, than the target by the margin; not if nothing is seen."""
+        if not len(self.depths):
+            return False
+        return bool(self.depths.max() < 1.0 - MARGIN if in_front else self.depths.min() > 1.0 + MARGIN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,53 +51,68 @@ class SceneView:
     T_base_cam: FloatArray
     target: TargetSpec
     depth: float
+    rise: float = 0.0
+    """Height of the stand under the target, m; 0 for none."""
+    forward: float = 0.0
+    """How far the camera moves ahead, m."""
 
-    def standing(self, x: float, depth: float, half_height: float) -> FloatArray | None:
-        """Centre in base of a thing on the table at image column x and some depth; None if out of sight."""
+    def point(self, x: float, y: float, depth: float) -> FloatArray:
+        """Point in base at normalised image coordinates and some depth, shape (3,), m."""
+        return self.T_base_cam[:3, 3] + depth * (self.T_base_cam[:3, :3] @ np.array([x, y, 1.0]))
+
+    def row(self, depth: float, height: float) -> float:
+        """Normalised vertical image coordinate at which points of some depth are at a height over the table, m.
+
+        The camera is level, so the column does not matter.
+        """
         rotation, eye = self.T_base_cam[:3, :3], self.T_base_cam[:3, 3]
-        height = TABLE_HEIGHT + half_height - eye[2]
-        y = (height / depth - rotation[2, 2]) / rotation[2, 1]
-        if abs(y) > _VISIBLE_Y:
-            return None
-        return eye + depth * (rotation @ np.array([x, y, 1.0]))
+        return float(((TABLE_HEIGHT + height - eye[2]) / depth - rotation[2, 2]) / rotation[2, 1])
 
-    def depths(self, obstacle: ObstacleSpec) -> FloatArray:
-        """Depth of the corners of an obstacle's box, relative to the target's."""
-        half = np.array(obstacle.shape.half_extent)
-        corners = np.array(list(product((-1.0, 1.0), repeat=3))) * half
-        c, s = math.cos(obstacle.yaw), math.sin(obstacle.yaw)
-        turned = corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        return transform(inverse(self.T_base_cam), turned + obstacle.position)[:, 2] / self.depth
-
-    def is_clearly(self, obstacle: ObstacleSpec, in_front: bool) -> bool:
-        """Whether all of an obstacle is nearer, or farther, than the target by the margin."""
-        depths = self.depths(obstacle)
-        return bool(depths.max() < 1.0 - MARGIN if in_front else depths.min() > 1.0 + MARGIN)
+    def sight(self, obstacle: ObstacleSpec) -> Sight:
+        """What is seen of an obstacle, by lines of sight through the boxes around its parts."""
+        depths = self._meet(_RAYS, obstacle.boxes)
+        hit = np.isfinite(depths)
+        low = plane_front(self.T_base_cam, _EYES, TABLE_HEIGHT, 1.0 / self.depth).ravel()[hit]
+        return Sight(depths[hit] / self.depth, _RAYS[hit, :2], float(low.mean()) if low.size else 0.0)
 
     def is_across(self, obstacle: ObstacleSpec) -> bool:
         """Whether the line of sight to the target passes through an obstacle's box."""
-        box, eye = obstacle.box, self.T_base_cam[:3, 3]
-        line = np.linspace(eye, np.array(self.target.position), 200)[:-20] - box.centre
-        c, s = math.cos(box.yaw), math.sin(box.yaw)
-        along = line @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return bool(np.any(np.all(np.abs(along) < box.half_extent, axis=1)))
+        return bool(self._meet(np.array([[0.0, 0.0, 1.0]]), obstacle.boxes)[0] < self.depth)
+
+    def _meet(self, rays: FloatArray, boxes: BoxSet) -> FloatArray:
+        """Depth at which each ray, in ``cam``, shape (n, 3), z = 1, meets the first box; inf where it meets none."""
+        depths = np.full(len(rays), np.inf)
+        directions = rays @ self.T_base_cam[:3, :3].T
+        for centre, rotation, half in zip(*boxes, strict=True):
+            begin, along = (self.T_base_cam[:3, 3] - centre) @ rotation, directions @ rotation
+            along = np.where(np.abs(along) < 1e-12, 1e-12, along)
+            near, far = (-half - begin) / along, (half - begin) / along
+            enter, leave = np.minimum(near, far).max(axis=1), np.maximum(near, far).min(axis=1)
+            depths = np.where((enter < leave) & (enter > 0.0), np.minimum(depths, enter), depths)
+        return depths
+
+    def has_room_for_hand(self, boxes: BoxSet) -> bool:
+        """Whether a thing keeps clear of the hand at the start and after it moved ahead."""
+        near = self.T_base_cam.copy()
+        near[:3, 3] += self.forward * near[:3, 2]
+        return not any(boxes_meet(hand_boxes(pose), boxes, _HAND_GAP) for pose in (self.T_base_cam, near))
 
     def facing(self, position: FloatArray) -> float:
-        """Yaw of a thing whose x axis points to the camera."""
+        """Yaw of a thing whose x axis points to the camera; its y axis then points to the right in the image."""
         offset = self.T_base_cam[:3, 3] - position
         return math.atan2(offset[1], offset[0])
 
 
-def sample_view(rng: np.random.Generator) -> SceneView:
-    """Draw target and camera."""
+def sample_view(rng: np.random.Generator, rise: float, forward: float) -> SceneView:
+    """Draw target and camera; ``rise`` and ``forward`` as in ``SceneView``."""
     shape = target_shape(str(rng.choice(("box", "cylinder", "ball", "ring", "duck"))))
     scale = float(rng.uniform(0.6, 1.0))
     x, y = (float(rng.uniform(*bounds)) for bounds in TARGET_REGION)
-    position = (x, y, TABLE_HEIGHT + shape.half_extent[2] * scale)
+    position = (x, y, TABLE_HEIGHT + rise + shape.half_extent[2] * scale)
     target = TargetSpec(shape.name, (scale, scale, scale), position, float(rng.uniform(-math.pi, math.pi)))
     azimuth = math.atan2(y, x) + math.radians(rng.uniform(25.0, 60.0))
     elevation = math.radians(rng.uniform(32.0, 45.0))
     depth = float(rng.uniform(0.42, 0.52))
     centre = np.array(position)
     eye = centre + depth * approach_directions(np.array([azimuth]), np.array([elevation]))[0]
-    return SceneView(look_at(eye, centre, np.array([0.0, 0.0, 1.0])), target, depth)
+    return SceneView(look_at(eye, centre, np.array([0.0, 0.0, 1.0])), target, depth, rise, forward)
