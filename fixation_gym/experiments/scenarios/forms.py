@@ -64,8 +64,8 @@ def hung(shape: Shape, height: float, pole: tuple[float, float]) -> tuple[Shape,
     """
     top, (x, y) = shape.half_extent[2] + 0.02, pole
     cord = Part("box", (0.003, 0.003, 0.012), (0.0, 0.0, top - 0.012))
-    arm = Part("box", (0.5 * math.hypot(x, y), 0.006, 0.006), (0.5 * x, 0.5 * y, top), yaw=math.atan2(y, x))
-    post = Part("box", (0.007, 0.007, 0.5 * (top + height)), (x, y, 0.5 * (top - height)))
+    arm = Part("box", (0.5 * math.hypot(x, y), 0.008, 0.008), (0.5 * x, 0.5 * y, top), yaw=math.atan2(y, x))
+    post = Part("box", (0.01, 0.01, 0.5 * (top + height)), (x, y, 0.5 * (top - height)))
     size = (_HALF_FOOT, _HALF_FOOT, 0.006)
     heavy = _FOOT_SHARE * sum(math.prod(part.size) for part in shape.parts) / math.prod(size)
     foot = Part("box", size, (x, y, 0.006 - height), density=heavy)

@@ -151,7 +151,7 @@ def _found(
     """A thing for every wish, or None if there is none for one of them; ``reds``: target and stand."""
     found: list[ObstacleSpec] = []
     for wish in wishes:
-        thing = find_thing(view, wish, [*reds, *(item.boxes for item in found)], rng)
+        thing = find_thing(view, wish, reds, found, rng)
         if thing is None:
             return None
         found.append(thing)

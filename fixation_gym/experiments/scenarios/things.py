@@ -28,11 +28,13 @@ PLAIN_TEXTURE = "wood_plain"
 _FRONT, _BEHIND = (0.5, 0.78), (1.2, 1.8)
 """Depth of the middle of things, relative to the target's."""
 _ATTEMPTS = 30
+_HIDDEN = 0.1
+"""Largest share of a thing that another one hides at the start."""
 _GAP = 0.01
 """Between things, m."""
 _LOW = 0.05
 """Parts whose middle is lower than this must be above the table, m."""
-_SCALES = {True: (0.35, 0.7), False: (0.7, 1.1)}
+_SCALES = {True: (0.4, 0.75), False: (0.7, 1.1)}
 """Of things in front and behind, so that sizes in the image do not differ as much as distances."""
 _LOWEST_ROW = 0.36
 """The middle of what stands on the table is within these rows."""
@@ -71,11 +73,26 @@ class Wish:
     """Range of its size; None for the usual one of its side."""
 
 
-def find_thing(view: SceneView, wish: Wish, others: list[BoxSet], rng: np.random.Generator) -> ObstacleSpec | None:
-    """Draw things until one is as wished and has room beside the others; None if none is."""
+def find_thing(
+    view: SceneView, wish: Wish, reds: list[BoxSet], others: list[ObstacleSpec], rng: np.random.Generator
+) -> ObstacleSpec | None:
+    """Draw things until one is as wished, has room and hides no other one; None if none is.
+
+    Args:
+        view: camera and target.
+        wish: what the thing shall be.
+        reds: target and stand.
+        others: things that are there already.
+        rng: generator.
+    """
+    taken = [*reds, *(other.boxes for other in others)]
+    lines = [view.sight(other).lines for other in others]
     for _ in range(_ATTEMPTS):
         drawn = draw(view, wish, rng)
-        if drawn is not None and has_room(view, drawn, others) and fulfils(view, wish, drawn):
+        if drawn is None or not has_room(view, drawn, taken) or not fulfils(view, wish, drawn):
+            continue
+        sight = view.sight(drawn)
+        if all(sight.overlap(other) <= _HIDDEN for other in lines):
             return drawn
     return None
 

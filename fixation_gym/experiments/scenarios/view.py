@@ -15,7 +15,7 @@ from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.robot import CAMERA_FOVY
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, MaskArray
 
 MARGIN = 0.12
 """What is clearly nearer or farther than the target differs by this share of its depth."""
@@ -34,8 +34,14 @@ class Sight:
     """Of the lines of sight that meet it, relative to the target's, shape (n,)."""
     places: FloatArray
     """Where they are in the image, normalised, shape (n, 2)."""
+    lines: MaskArray
+    """Which of all lines of sight meet it."""
     low_share: float
     """Share of them for which the table alone says "in front": there its plane is nearer than the target."""
+
+    def overlap(self, lines: MaskArray) -> float:
+        """Share of the lines of sight of this or of another thing, of which fewer are there, that meet both."""
+        return float(np.count_nonzero(self.lines & lines)) / max(1, min(len(self.depths), int(np.count_nonzero(lines))))
 
     def is_clearly(self, in_front: bool) -> bool:
         """Whether all that is seen is nearer, or farther, than the target by the margin; not if nothing is seen."""
@@ -73,7 +79,7 @@ class SceneView:
         depths = self._meet(_RAYS, obstacle.boxes)
         hit = np.isfinite(depths)
         low = plane_front(self.T_base_cam, _EYES, TABLE_HEIGHT, 1.0 / self.depth).ravel()[hit]
-        return Sight(depths[hit] / self.depth, _RAYS[hit, :2], float(low.mean()) if low.size else 0.0)
+        return Sight(depths[hit] / self.depth, _RAYS[hit, :2], hit, float(low.mean()) if low.size else 0.0)
 
     def is_across(self, obstacle: ObstacleSpec) -> bool:
         """Whether the line of sight to the target passes through an obstacle's box."""
