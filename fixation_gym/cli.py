@@ -20,7 +20,7 @@ import tyro
 from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train
-from fixation_gym.report_commands import Ablate, Report, print_different, split_names
+from fixation_gym.report_commands import Ablate, Necessity, Report, print_different, split_names
 
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 """What a disk that is full or broken says."""
@@ -244,6 +244,7 @@ Commands = (
     | Annotated[Compare, tyro.conf.subcommand("compare")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Scenarios, tyro.conf.subcommand("scenarios")]
+    | Annotated[Necessity, tyro.conf.subcommand("necessity")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )

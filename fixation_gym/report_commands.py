@@ -1,4 +1,4 @@
-"""The commands ``ablate`` and ``report``; see ``cli``."""
+"""The commands ``ablate``, ``necessity`` and ``report``; see ``cli``."""
 
 from __future__ import annotations
 
@@ -66,6 +66,42 @@ class Ablate:
         print_different(different)
         print(format_ablations(summary, {variant.name: variant.summary for variant in VARIANTS}))
         print(f"\n{self.out / REPORT_FILE}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Necessity:
+    """The best fixed blind way of every scenario: must obstacles be seen? The same command again resumes."""
+
+    scenario: str = ""
+    """Scenario names, separated by commas; by default all with obstacles, with --quick three of them."""
+    quick: bool = False
+    """A few ways and four episodes: minutes, to see that everything works."""
+    episodes: int | None = None
+    """Episodes per scenario and way, an even number, half to choose the best way and half to judge it; 40 by default, 4
+    with --quick."""
+    seed: int = 0
+    """Chooses the block of episode seeds, as for evaluate."""
+    agent: Path | None = None
+    """An agent's zip, such as a trained blind one, to put beside the ways."""
+    workers: int = 1
+    """Number of processes."""
+    out: Path = Path("out/necessity")
+    """Folder of the results."""
+
+    def run(self) -> int:
+        """Try the ways and print the table."""
+        from fixation_gym.experiments.necessity.run import FIGURE_FILE, ROWS_FILE, TABLE_FILE, NecessityConfig, measure
+
+        scenarios = split_names(self.scenario) if self.scenario else None
+        config = NecessityConfig(scenarios, self.quick, self.episodes, self.seed, self.agent, self.workers)
+        config.check()
+        select_backend()
+        from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.necessity.statistics import format_table
+
+        print(format_table(measure(config, self.out)["table"]))
+        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, TABLE_FILE, ROWS_FILE, FIGURE_FILE)))
         return 0
 
 

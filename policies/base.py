@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from fixation_gym.envs.pick_sim import PickSim
+    from fixation_gym.envs.scene import SceneSpec
 
 Action = NDArray[np.float32]
 
@@ -36,4 +40,18 @@ class Policy(Protocol):
 
     def act(self, obs: Mapping[str, Any]) -> Action:
         """Action of shape (7,) for an observation."""
+        ...
+
+
+class SimulatedWorld(Protocol):
+    """What a privileged policy looks into; an unwrapped ``FixationPick-v0`` is one."""
+
+    @property
+    def sim(self) -> PickSim:
+        """The simulation."""
+        ...
+
+    @property
+    def scene(self) -> SceneSpec | None:
+        """The scene of the episode; None before the first."""
         ...

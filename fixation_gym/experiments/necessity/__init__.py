@@ -1,0 +1,1 @@
+"""Whether obstacles must be seen: the best fixed blind way of every scenario."""

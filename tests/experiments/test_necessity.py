@@ -1,0 +1,302 @@
+"""Blind ways: the family, the choice of the best one, what the command runs and writes, and that scenes bar them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import zlib
+from collections.abc import Mapping
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from evaluation_fakes import FakeEnv, FakePolicy
+
+from fixation_gym import cli, report_commands
+from fixation_gym.control.corridor import free_directions
+from fixation_gym.control.reach import HIGHEST, LOWEST, REACH_GRID, azimuth_range, reachable_directions
+from fixation_gym.envs.config import SCENARIOS
+from fixation_gym.envs.sampling import sample_scene
+from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.statistics import wilson_interval
+from fixation_gym.experiments.necessity import run as necessity
+from fixation_gym.experiments.necessity.episodes import Outcome, play_in
+from fixation_gym.experiments.necessity.run import (
+    FIGURE_FILE,
+    ROWS_FILE,
+    TABLE_FILE,
+    NecessityConfig,
+    cell_key,
+    measure,
+    run_cell,
+    scenarios_with_obstacles,
+)
+from fixation_gym.experiments.necessity.statistics import Counts, Tally, format_table, summarise
+from fixation_gym.experiments.necessity.ways import ELEVATIONS, QUICK_WAYS, STRAIGHT, WAYS, azimuth_cells
+from fixation_gym.geometry.boxes import joined
+from policies import catalogue
+from policies.blind_ways import BlindWay
+
+SCENES = 12
+"""Scenes per scenario of the geometric test."""
+MOST_OPEN, MOST_OPEN_IN_ALL = 0.75, 0.45
+"""Largest share of scenes in which one direction is open: of the scenes of one scenario, and of all."""
+CONFIG = NecessityConfig(scenarios=("opaque", "bin"), quick=True)
+
+
+# -- the family --------------------------------------------------------------------------------------------------------
+
+
+def test_the_family_has_many_different_ways_of_every_style_and_speed():
+    assert len(WAYS) >= 60
+    assert len(set(WAYS.values())) == len(WAYS)
+    assert {(way.style, way.origin) for way in WAYS.values()} >= {
+        ("straight", "base"),
+        ("straight", "view"),
+        ("straight", "target"),
+        ("curved", "base"),
+        ("stepped", "view"),
+    }
+    assert {way.speed for way in WAYS.values()} == {0.04, 0.10}
+    assert set(QUICK_WAYS) < set(WAYS)
+
+
+@pytest.mark.parametrize("first_view", np.radians([-80.0, 30.0, 75.0, 178.0]))
+def test_all_ways_are_within_reach(first_view):
+    bearing = math.radians(-10.0)
+    for way in WAYS.values():
+        low, high = azimuth_range(math.radians(way.elevation_deg))
+        azimuths = way.azimuths(bearing, first_view) - bearing
+        assert np.all((low - 1e-9 <= azimuths) & (azimuths <= high + 1e-9)), way.name
+        for depth, seconds in ((math.inf, 0.0), (0.3, 1.0), (0.18, 5.0)):
+            assert LOWEST - 1e-9 <= way.elevation(depth, seconds) <= HIGHEST + 1e-9, way.name
+
+
+def test_straight_ways_are_nowhere_far_apart():
+    for elevation in ELEVATIONS:
+        low, high = (math.degrees(angle) for angle in azimuth_range(math.radians(elevation)))
+        cells = azimuth_cells(elevation)
+        assert cells[0][0] == pytest.approx(low)
+        assert cells[-1][1] == pytest.approx(high)
+        for (_, end), (begin, _) in pairwise(cells):
+            assert end == begin
+        assert max((end - begin) * math.cos(math.radians(elevation)) for begin, end in cells) < 18.0
+    assert len(STRAIGHT) == sum(len(azimuth_cells(elevation)) for elevation in ELEVATIONS)
+
+
+def test_styles_differ_in_how_they_come_in():
+    curved, stepped = BlindWay(50, 40, style="curved"), BlindWay(50, 40, style="stepped")
+    assert math.degrees(curved.elevation(math.inf, 0.0)) == pytest.approx(70.0)
+    assert math.degrees(curved.elevation(0.20, 3.0)) == pytest.approx(50.0)
+    assert 52.0 < math.degrees(curved.elevation(0.35, 1.0)) < 68.0
+    speeds = [stepped.speed_at(seconds) for seconds in np.arange(0.0, 5.0, 0.04)]
+    assert sum(a > b for a, b in pairwise(speeds)) == 2
+    assert speeds[0] == speeds[-1] == 0.10
+    assert math.degrees(stepped.elevation(0.3, 1.0)) == pytest.approx(58.0)
+    assert math.degrees(stepped.elevation(0.3, 2.0)) == pytest.approx(50.0)
+
+
+def test_a_way_from_the_first_view_ends_where_the_reach_does():
+    way = BlindWay(42, 50, origin="view")
+    high = azimuth_range(math.radians(42.0))[1]
+    assert way.azimuths(0.1, 0.1 + math.radians(20.0))[0] == pytest.approx(0.1 + math.radians(70.0))
+    assert way.azimuths(0.1, 0.1 + math.radians(60.0))[0] == pytest.approx(0.1 + high)
+
+
+# -- the choice --------------------------------------------------------------------------------------------------------
+
+
+def episode(scenario: str, member: str, seed: int, success: bool) -> dict[str, Any]:
+    values = {"scenario": scenario, "member": member, "seed": seed, "success": success}
+    return {**values, "collision": not success, "time_s": 1.0, "phase": "lift"}
+
+
+def made_up(scenario: str, successes: Mapping[str, tuple[int, int]], n: int = 10) -> list[dict[str, Any]]:
+    """Episodes with so many successes of n on the even seeds and on the odd ones."""
+    return [
+        episode(scenario, member, 2 * index + half, index < k)
+        for member, halves in successes.items()
+        for half, k in enumerate(halves)
+        for index in range(n)
+    ]
+
+
+def test_the_best_way_is_chosen_on_one_half_and_judged_on_the_other():
+    episodes = made_up("bin", {"a": (4, 9), "b": (6, 2), "c": (6, 5), "blind": (1, 2), "oracle": (10, 9)})
+    summary = summarise(episodes, ("a", "b", "c"))
+    (row,) = summary["table"]
+    assert (row["best"], row["best_k"], row["best_n"], row["chosen_on_k"]) == ("b", 2, 10, 6)
+    assert (row["best_low"], row["best_high"]) == wilson_interval(2, 10)
+    assert (row["hindsight"], row["hindsight_k"], row["hindsight_n"]) == ("a", 13, 20)
+    assert (row["blind_k"], row["blind_n"], row["oracle_k"]) == (3, 20, 19)
+    assert "agent_k" not in row
+    assert {(r["member"], r["k"], r["n"], r["collisions"]) for r in summary["rows"]} >= {("a", 13, 20, 7)}
+    text = format_table(summary["table"])
+    assert "2/10  20% [6, 51]" in text
+    assert "upper bound" in text
+
+
+def test_one_way_for_all_scenarios_is_chosen_too_and_an_agent_has_its_column():
+    first = made_up("bin", {"a": (6, 1), "b": (5, 5), "agent:0123": (3, 3)})
+    second = made_up("opaque", {"a": (0, 9), "b": (4, 4), "agent:0123": (1, 0)})
+    table = summarise([*first, *second], ("a", "b"))["table"]
+    assert [row["scenario"] for row in table] == ["bin", "opaque", "all"]
+    assert [row["best"] for row in table] == ["a", "b", "b"]
+    assert (table[-1]["best_k"], table[-1]["best_n"], table[-1]["agent_k"]) == (9, 20, 7)
+
+
+def test_counts_add_up():
+    total = sum([Tally(Counts(1, 2), Counts(0, 3), 1)] * 2, start=Tally())
+    assert (total.whole, total.collisions) == (Counts(2, 10), 2)
+    assert Counts().rate is None
+
+
+# -- the command -------------------------------------------------------------------------------------------------------
+
+
+def fake_run(cell: dict[str, Any]) -> dict[str, Any]:
+    good = cell["member"] == "oracle" or zlib.crc32(f"{cell['member']} {cell['seed']}".encode()) % 5 == 0
+    return episode(cell["scenario"], cell["member"], cell["seed"], good)
+
+
+def test_by_default_all_scenarios_with_obstacles_are_tried_with_all_ways():
+    config = NecessityConfig()
+    assert {"opaque", "bin", "moving_obstacle"} <= set(config.scenario_names)
+    assert not {"clear", "moving_target", "distractor"} & set(config.scenario_names)
+    cells = config.cells()
+    members = len(WAYS) + 1 + len(config.policies())
+    assert len(cells) == members * 40 * len(scenarios_with_obstacles())
+    assert all(cell_key(cell) == key for key, cell in cells.items())
+    assert config.policies()["blind"] == "blind"
+
+
+def test_another_agent_is_another_member(tmp_path: Path):
+    members = []
+    for content in (b"one", b"two"):
+        (tmp_path / "agent.zip").write_bytes(content)
+        members += [m for m in NecessityConfig(agent=tmp_path / "agent.zip").policies() if m.startswith("agent:")]
+    assert len(set(members)) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--scenario", "nowhere"], "unknown scenario 'nowhere'; choose one of clear, opaque"),
+        (["--scenario", "bin,bin"], "--scenario must name one or more different scenarios"),
+        (["--episodes", "5"], "--episodes must be an even number within 2.."),
+        (["--episodes", "0"], "--episodes must be an even number within 2.."),
+        (["--seed", "-1"], "--seed must be 0 or more"),
+        (["--workers", "0"], "--workers must be at least 1"),
+        (["--agent", "agent.txt"], "--agent must be an agent's .zip, got agent.txt"),
+        (["--agent", "nowhere.zip"], "nowhere.zip"),
+    ],
+)
+def test_bad_options_are_one_line_and_leave_no_folder(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(["necessity", "--out", str(tmp_path / "out"), *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_run_resumes_without_losing_or_repeating(tmp_path: Path):
+    calls: list[tuple[Any, ...]] = []
+
+    def dying(cell: dict[str, Any]) -> dict[str, Any]:
+        if len(calls) == 9:
+            raise KeyboardInterrupt
+        calls.append(cell_key(cell))
+        return fake_run(cell)
+
+    with pytest.raises(KeyboardInterrupt):
+        measure(CONFIG, tmp_path, dying)
+    calls.append(("killed", "", 0))
+    summary = measure(CONFIG, tmp_path, lambda cell: calls.append(cell_key(cell)) or fake_run(cell))
+    calls.remove(("killed", "", 0))
+    assert summary["episodes_resumed"] == 9
+    assert sorted(calls) == sorted(CONFIG.cells())
+    assert summary["table"] == measure(CONFIG, tmp_path / "other", fake_run)["table"]
+    measure(CONFIG, tmp_path, lambda cell: pytest.fail("nothing is left to do"))
+    with pytest.raises(UsageError, match="seed 0 instead of 1"):
+        measure(NecessityConfig(scenarios=("bin",), quick=True, seed=1), tmp_path, fake_run)
+
+
+def test_the_folder_holds_summary_tables_and_figure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(report_commands, "select_backend", lambda: "egl")
+    monkeypatch.setattr(necessity.measure, "__defaults__", (fake_run,))
+    assert cli.main(["necessity", "--quick", "--scenario", "opaque,bin", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.startswith("scenario")
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    members = len(QUICK_WAYS) + 1 + len(CONFIG.policies())
+    assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == members * 2 * 4
+    for name, rows in ((ROWS_FILE, summary["rows"]), (TABLE_FILE, summary["table"])):
+        with (tmp_path / name).open(newline="") as file:
+            assert len(list(csv.DictReader(file))) == len(rows)
+    assert (tmp_path / FIGURE_FILE).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("seed", "success", "steps", "phase"), [(2, True, 5, "lift"), (4, False, 2, "approach")])
+def test_an_episode_with_images_ends_at_its_first_collision(seed, success, steps, phase):
+    outcome = play_in(FakeEnv(), FakePolicy(), seed)
+    assert outcome == Outcome(success, not success, pytest.approx(steps / 25.0), phase)
+
+
+# -- scenes ------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def open_shares(name: str) -> np.ndarray:
+    """Share of scenes in which nothing that stands bars a direction of the reach's grid, shape (n,)."""
+    found = np.zeros(len(REACH_GRID))
+    for seed in range(SCENES):
+        scene = sample_scene(SCENARIOS[name], np.random.default_rng([seed, 11]))
+        target = scene.target.places[-1]
+        boxes = joined([obstacle.boxes for obstacle in scene.obstacles if obstacle.motion is None])
+        found += free_directions(target, boxes, reachable_directions(target), 0.0)
+    return found / SCENES
+
+
+@pytest.mark.parametrize("name", scenarios_with_obstacles())
+def test_no_direction_is_open_in_most_scenes(name):
+    assert open_shares(name).max() <= MOST_OPEN
+
+
+def test_no_direction_is_open_in_many_scenes_of_all_scenarios():
+    assert np.mean([open_shares(name) for name in scenarios_with_obstacles()], axis=0).max() <= MOST_OPEN_IN_ALL
+
+
+# -- simulation --------------------------------------------------------------------------------------------------------
+
+
+def outcome(scenario: str, member: str, seed: int) -> dict[str, Any]:
+    return run_cell({"scenario": scenario, "member": member, "seed": seed})
+
+
+@pytest.mark.sim
+def test_blind_ways_pick_without_obstacles_and_mostly_collide_with_them():
+    steep = "straight el70 base+40 0.10m/s"
+    clear = outcome("clear", steep, 500_000)
+    assert clear["success"]
+    env = pytest.importorskip("gymnasium").make("fixation_gym:FixationPick-v0", scenario="clear", image_size=None)
+    obs, _ = env.reset(seed=500_000)
+    policy = catalogue.make_policy("oracle", env)
+    done, steps = False, 0
+    while not done:
+        obs, _, terminated, truncated, info = env.step(policy.act(obs))
+        done, steps = terminated or truncated, steps + 1
+    env.close()
+    same = outcome("clear", "oracle", 500_000)
+    assert (same["success"], same["time_s"]) == (info["is_success"], pytest.approx(steps / 25.0))
+    members = (steep, "straight el48 view+0 0.10m/s", "straight el62 base+60 0.10m/s")
+    ends = [outcome("opaque", member, seed) for seed in range(500_000, 500_004) for member in members]
+    assert sum(end["success"] for end in ends) <= 6
+    assert sum(end["collision"] for end in ends) >= 6
