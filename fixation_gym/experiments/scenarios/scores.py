@@ -130,6 +130,8 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
             "front": count(asked & front),
             "front_called": count(asked & front & called),
             "called": count(asked & called),
+            "inner_obstacle": count(asked & truth.inner & truth.places["obstacle"]),
+            "inner_obstacle_right": count(asked & truth.inner & truth.places["obstacle"] & right),
             "image": count(asked & truth.image),
             "inner_image": count(asked & truth.image & truth.inner),
             "inner_image_behind": count(asked & truth.image & truth.inner & ~called),
