@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fixation_gym.control import open_loop, servo_laws
-from fixation_gym.control.corridor import BoxSet, approach_directions, box_set, free_directions, joined, level_axes
+from fixation_gym.control.corridor import approach_directions, free_directions, level_axes
+from fixation_gym.control.reach import reachable_directions
 from fixation_gym.envs.object_pool import target_shape
-from fixation_gym.envs.reach import reachable_directions
 from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
+from fixation_gym.geometry.boxes import BoxSet, box_set, joined
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import FloatArray
-from policies.base import Action, Estimate
-
-if TYPE_CHECKING:
-    from fixation_gym.envs.pick_sim import PickSim
+from policies.base import Action, Estimate, SimulatedWorld
 
 IntArray = NDArray[np.int64]
 
@@ -46,20 +44,6 @@ _MOVED = 0.02
 """A target that is farther than this from where it was aimed at is aimed at anew, m."""
 _NEAR_ANGLE = math.radians(4.0)
 _PHASES = ("fixate", "approach", "grasp", "close", "lift")
-
-
-class SimulatedWorld(Protocol):
-    """What a privileged policy looks into; an unwrapped ``FixationPick-v0`` is one."""
-
-    @property
-    def sim(self) -> PickSim:
-        """The simulation."""
-        ...
-
-    @property
-    def scene(self) -> SceneSpec | None:
-        """The scene of the episode; None before the first."""
-        ...
 
 
 class OraclePolicy:

@@ -5,14 +5,13 @@ Used by the servo on what it has seen, by the scene sampler, so that every scene
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from fixation_gym.geometry.boxes import Box, BoxSet, box_set, joined
 from fixation_gym.robot import TOOL_IN_CAMERA
 from fixation_gym.types import FloatArray, MaskArray
 
@@ -31,6 +30,13 @@ _LAST_STRETCH = 0.12
 """Length of the open-loop motion, m; before it, the target is on the camera's axis and the tool below it."""
 
 
+def near_hand(points: FloatArray, margin: float) -> MaskArray:
+    """Which points, shape (n, 3), in ``cam``, m, are within about ``margin`` m of the hand, shape (n,)."""
+    middles, halves = 0.5 * (_PARTS[:, 0] + _PARTS[:, 1]), 0.5 * (_PARTS[:, 1] - _PARTS[:, 0])
+    beyond = np.abs(points[:, None] - TOOL_IN_CAMERA - middles) - halves
+    return np.any(np.all(beyond < margin, axis=-1), axis=-1)
+
+
 def _swept_boxes() -> FloatArray:
     """Boxes swept by every part: on the approach, below the camera's axis, and on the last stretch, shape (n, 2, 3)."""
     last, approach = _PARTS.copy(), _PARTS.copy()
@@ -43,55 +49,6 @@ def _swept_boxes() -> FloatArray:
 
 _SWEEP_LENGTH = 0.45
 _BOXES = _swept_boxes()
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box around an object or a part of it, in the robot base frame."""
-
-    centre: FloatArray
-    half_extent: FloatArray
-    yaw: float
-    """Rotation about the vertical, rad."""
-    pitch: float = 0.0
-    """Rotation about the box's y axis before ``yaw``, rad; 0: upright."""
-
-    @property
-    def rotation(self) -> FloatArray:
-        """Rotation of the box's axes in base, shape (3, 3)."""
-        cy, sy, cp, sp = math.cos(self.yaw), math.sin(self.yaw), math.cos(self.pitch), math.sin(self.pitch)
-        return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
-
-
-class BoxSet(NamedTuple):
-    """Boxes as arrays, for tests of many."""
-
-    centres: FloatArray
-    """Shape (n, 3), in base, m."""
-    rotations: FloatArray
-    """Axes of each box in base, shape (n, 3, 3)."""
-    halves: FloatArray
-    """Half sizes, shape (n, 3), m."""
-
-    def moved(self, offset: FloatArray) -> BoxSet:
-        """The same boxes elsewhere; ``offset`` has shape (3,), m."""
-        return self._replace(centres=self.centres + offset)
-
-
-def box_set(boxes: Sequence[Box]) -> BoxSet:
-    """Boxes as arrays."""
-    if not boxes:
-        return BoxSet(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
-    centres = np.array([box.centre for box in boxes])
-    halves = np.array([box.half_extent for box in boxes])
-    return BoxSet(centres, np.array([box.rotation for box in boxes]), halves)
-
-
-def joined(sets: Sequence[BoxSet]) -> BoxSet:
-    """All boxes of some sets."""
-    if not sets:
-        return box_set([])
-    return BoxSet(*(np.concatenate(arrays) for arrays in zip(*sets, strict=True)))
 
 
 def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
@@ -241,7 +198,7 @@ def meeting_pairs(sets: Sequence[BoxSet], gap: float) -> MaskArray:
 
 @njit(cache=True)
 def _meeting_pairs(
-    places: FloatArray, turns: FloatArray, halves: FloatArray, owners: MaskArray, count: int, gap: float
+    places: FloatArray, turns: FloatArray, halves: FloatArray, owners: NDArray[np.int64], count: int, gap: float
 ) -> MaskArray:
     """The compiled part of ``meeting_pairs``; ``owners`` are the sets of the boxes, shape (m,)."""
     meets = np.zeros((count, count), np.bool_)

@@ -49,8 +49,12 @@ class OpenLoopGains:
     """Distance at which the tool has arrived, m."""
     grasp_height: float = 0.85
     """Height of the grasp above the support surface as a share of the point's: many things are widest below it."""
-    finger_room: float = 0.011
-    """Least height of the tool above the support surface, m."""
+    finger_room: float = 0.002
+    """Least height of the open fingers above the support surface, m."""
+    finger_reach: tuple[float, float, float] = (0.050, 0.011, 0.010)
+    """How far the open fingers reach beyond the tool's point along x, y and z of the camera, m."""
+    top_room: float = 0.006
+    """However flat the fingers come in, the tool stays this far below the top of the target, m."""
     finger_length: float = 0.043
     """Distance from the tool back to the palm, which must not touch the target, m."""
     reaim_distance: float = 0.008
@@ -108,7 +112,9 @@ def begin_grasp(T_base_cam: FloatArray, target: Target, time: float, gains: Open
         axis = T_base_cam[:3, 2]
         point -= axis * max(0.0, target.reach + float(axis @ (point - target.point)) - gains.finger_length)
     if support is not None:
-        point[2] = max(point[2], support + gains.finger_room)
+        lowest = support + gains.finger_room + float(np.abs(T_base_cam[2, :3]) @ gains.finger_reach)
+        highest = 2.0 * float(target.point[2]) - support - gains.top_room
+        point[2] = max(point[2], min(lowest, highest))
     return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA)
 
 

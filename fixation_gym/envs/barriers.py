@@ -7,15 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fixation_gym.control.corridor import (
-    BoxSet,
-    box_set,
-    boxes_meet,
-    free_directions,
-    hand_boxes,
-    joined,
-    meeting_pairs,
-)
+from fixation_gym.control.corridor import boxes_meet, free_directions, hand_boxes, meeting_pairs
 from fixation_gym.control.reach import REACH_GRID
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.goal import Goal
@@ -23,6 +15,7 @@ from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS
 from fixation_gym.envs.placement import OBSTACLE_GAP, draw_kind, draw_mover, draw_obstacle, moved_out
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
 from fixation_gym.envs.visibility import is_seen, passes_through, visible_share
+from fixation_gym.geometry.boxes import BoxSet, box_set, joined
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.types import FloatArray, MaskArray
 

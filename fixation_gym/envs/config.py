@@ -106,6 +106,8 @@ class Scenario:
         still, moving = self.obstacle_count, self.moving_count
         if still[1] + moving[1] > MAX_OBSTACLES:
             raise ValueError(f"obstacle_count and moving_count may add up to {MAX_OBSTACLES}, got {still} and {moving}")
+        if (self.through_sight or self.discovery) and still[0] < 1:
+            raise ValueError("through_sight and discovery need an obstacle_count of 1 or more")
         if still[1] + moving[1] == 0:
             return
         if not self.obstacle_materials or not self.obstacle_kinds:
@@ -114,8 +116,6 @@ class Scenario:
             raise ValueError(f"moving_count {moving} needs obstacle_motions from {list(OBSTACLE_MOTIONS)}")
         if set(self.obstacle_materials) == {"mirror"} and still[1] + moving[1] > 1:
             raise ValueError("obstacle_materials of mirrors alone allow one obstacle; add another material")
-        if (self.through_sight or self.discovery) and still[0] < 1:
-            raise ValueError("through_sight and discovery need an obstacle_count of 1 or more")
 
 
 def _require_names(field: str, names: tuple[str, ...], allowed: tuple[str, ...]) -> None:

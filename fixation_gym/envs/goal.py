@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fixation_gym.control.corridor import approach_directions, box_set, hand_axes
+from fixation_gym.control.corridor import approach_directions, hand_axes
 from fixation_gym.control.reach import reachable_directions
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.placement import Room, sample_push
 from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, TargetSpec
+from fixation_gym.geometry.boxes import box_set
 from fixation_gym.types import FloatArray, MaskArray
 
 _PUSHED_REGION = ((0.46, 0.66), (-0.18, 0.18))

@@ -130,8 +130,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Draw a new scene. ``options`` are not used."""
         super().reset(seed=seed)
+        # Noise has a generator of its own: scenes depend on the seed alone, not on how long earlier episodes were.
+        self._noise_rng = self.np_random.spawn(1)[0]
         self.scene = sample_scene(self.scenario, self.np_random)
-        self._errors = sensors.draw_episode_errors(self.noise, self.np_random)
+        self._errors = sensors.draw_episode_errors(self.noise, self._noise_rng)
         self.sim.reset(self.scene)
         self._steps = 0
         self._steps_lifted = 0
@@ -243,10 +245,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         observation: dict[str, Any] = {}
         if self._image_size is not None and self.camera_on:
             image = self._image("observation", exposed_qpos)
-            self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self.np_random)
+            self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self._noise_rng)
         if self._image_size is not None:
             observation["rgb"] = self._last_rgb.copy()
-        joint_pos, joint_vel = sensors.measure_joints(state.joint_pos, state.joint_vel, self.noise, self.np_random)
+        joint_pos, joint_vel = sensors.measure_joints(state.joint_pos, state.joint_vel, self.noise, self._noise_rng)
         pose = sensors.measure_camera_pose(
             state.camera_pose, state.jacobian, joint_pos - state.joint_pos, self._errors.hand_eye
         )

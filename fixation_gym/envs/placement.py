@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.corridor import BoxSet, any_meets, any_pair_meets, swept_hand
+from fixation_gym.control.corridor import any_meets, any_pair_meets, swept_hand
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.obstacle_kinds import ObstacleKind, kinds_of
 from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
 from fixation_gym.envs.shapes import centred
+from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray
 
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
@@ -26,7 +27,7 @@ _MOVER_DISTANCE = (0.15, 0.27)
 _DENSITY = 250.0
 """Of what obstacles are made of, kg/m^3; light wood with hollow parts."""
 _LEAST_MASS, _LARGEST_MASS = 0.3, 1.5
-_ORBIT = 0.37
+_ORBIT = 0.355
 """What is seen above a slope of ``_FLAT`` from the target stays this near, m: the hand goes around farther out."""
 _FLAT = 0.5
 _TABLE = ((0.24, 0.90), (-0.36, 0.36))

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fixation_gym.control.corridor import Box, BoxSet, joined
 from fixation_gym.envs.motion import Motion, places
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.shapes import Shape, Vector
+from fixation_gym.geometry.boxes import Box, BoxSet, joined
 from fixation_gym.types import FloatArray
 
 TABLE_HEIGHT = -0.112

@@ -1,5 +1,3 @@
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's functions have no type stubs.)
 """Writes a ``SceneSpec`` into the compiled model: shows, shapes, weighs and colours the pool parts it needs.
 
 Every load starts from the fields as they were compiled, so a scene leaves nothing behind for the next one.
@@ -11,7 +9,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from fixation_gym.envs.motion import Motion
@@ -33,12 +30,6 @@ from fixation_gym.types import FloatArray
 TARGET_RGBA = (0.80, 0.06, 0.05, 1.0)
 _LABEL_RGBA = (0.85, 0.85, 0.25, 1.0)
 _UNTINTED = (1.0, 1.0, 1.0, 1.0)
-_TYPES = {
-    "box": int(mujoco.mjtGeom.mjGEOM_BOX),
-    "cylinder": int(mujoco.mjtGeom.mjGEOM_CYLINDER),
-    "sphere": int(mujoco.mjtGeom.mjGEOM_SPHERE),
-    "ellipsoid": int(mujoco.mjtGeom.mjGEOM_ELLIPSOID),
-}
 
 _WRITTEN_FIELDS = (
     *("geom_type", "geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb", "geom_group", "geom_contype"),
@@ -78,6 +69,9 @@ class SceneLoader:
                 geoms = [model.geom(red_part_name(body, shape, i)).id for i in range(len(shape.parts))]
                 entries = zip(geoms, shape.parts, strict=True)
                 self._red[body, shape.name] = [_PartGeom(g, model.geom_size[g].copy(), part) for g, part in entries]
+        # Targets have parts of all primitives.
+        red = [entry for entries in self._red.values() for entry in entries]
+        self._types = {entry.part.primitive: int(model.geom_type[entry.geom]) for entry in red}
         self._slots = {
             f"obstacle{slot}": [model.geom(obstacle_part_name(f"obstacle{slot}", i)).id for i in range(parts)]
             for slot, parts in enumerate(SLOTS)
@@ -85,7 +79,7 @@ class SceneLoader:
         self._bodies = {name: model.body(name).id for name in [*RED_BODIES, *self._slots]}
         self._materials = {model.mat(i).name: i for i in range(model.nmat)}
         self._table_geom = model.geom("table_visual").id
-        pool = [entry.geom for parts in self._red.values() for entry in parts]
+        pool = [entry.geom for entry in red]
         pool += [geom for geoms in self._slots.values() for geom in geoms]
         model.geom_contype[pool] = model.geom_conaffinity[pool] = 0
         bodies = list(self._bodies.values())
@@ -122,7 +116,7 @@ class SceneLoader:
         colours = {"glass": obstacle.rgba, "rim": obstacle.frame_rgba, "label": _LABEL_RGBA}
         materials = {"solid": obstacle.texture, "mirror": MIRROR_MATERIAL}
         for geom, part in zip(self._slots[slot], obstacle.shape.parts, strict=False):
-            model.geom_type[geom] = _TYPES[part.primitive]
+            model.geom_type[geom] = self._types[part.primitive]
             model.geom_quat[geom] = quaternion(part)
             size = np.zeros(3)
             size[: len(mujoco_size(part))] = mujoco_size(part)

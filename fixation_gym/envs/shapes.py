@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from fixation_gym.control.corridor import BoxSet
+from fixation_gym.geometry.boxes import BoxSet, rotations
 from fixation_gym.types import FloatArray
 
 Vector = tuple[float, float, float]
@@ -38,8 +38,7 @@ class Part:
     @property
     def rotation(self) -> FloatArray:
         """Rotation of the part's axes in the shape's, shape (3, 3)."""
-        cy, sy, cp, sp = math.cos(self.yaw), math.sin(self.yaw), math.cos(self.pitch), math.sin(self.pitch)
-        return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
+        return rotations(np.array([self.yaw]), np.array([self.pitch]))[0]
 
 
 @dataclass(frozen=True)
@@ -59,13 +58,13 @@ class Shape:
         c, s = math.cos(yaw), math.sin(yaw)
         x, y, z = values[:, :3].T
         centres = np.stack([c * x - s * y, s * x + c * y, z], axis=-1) + position
-        return BoxSet(centres, _rotations(values[:, 6], values[:, 7]), values[:, 3:6])
+        return BoxSet(centres, rotations(values[:, 6], values[:, 7]), values[:, 3:6])
 
 
 def centred(name: str, parts: tuple[Part, ...], mass: float) -> tuple[Shape, Vector]:
     """A shape of parts given in any frame, and where its origin, the centre of its bounding box, is in that frame."""
     values = np.array([(*part.pos, *part.size, part.yaw, part.pitch) for part in parts])
-    reach = np.einsum("nij,nj->ni", np.abs(_rotations(values[:, 6], values[:, 7])), values[:, 3:6])
+    reach = np.einsum("nij,nj->ni", np.abs(rotations(values[:, 6], values[:, 7])), values[:, 3:6])
     low, high = (values[:, :3] - reach).min(axis=0), (values[:, :3] + reach).max(axis=0)
     origin, half = 0.5 * (low + high), 0.5 * (high - low)
     places = (values[:, :3] - origin).tolist()
@@ -76,13 +75,6 @@ def centred(name: str, parts: tuple[Part, ...], mass: float) -> tuple[Shape, Vec
 def _placed(part: Part, pos: Vector) -> Part:
     """The part elsewhere; quicker than ``dataclasses.replace``, for scenes are drawn at every reset."""
     return Part(part.primitive, part.size, pos, part.yaw, part.pitch, part.finish, part.density)
-
-
-def _rotations(yaws: FloatArray, pitches: FloatArray) -> FloatArray:
-    """Rotations of yaw about z after pitch about y, shape (n, 3, 3)."""
-    cy, sy, cp, sp = np.cos(yaws), np.sin(yaws), np.cos(pitches), np.sin(pitches)
-    rows = (cy * cp, -sy, cy * sp, sy * cp, cy, sy * sp, -sp, np.zeros_like(cp), cp)
-    return np.stack(rows, axis=-1).reshape(-1, 3, 3)
 
 
 def scaled(shape: Shape, factor: float) -> Shape:

@@ -6,18 +6,20 @@ import math
 
 import numpy as np
 
-from fixation_gym.control.corridor import Box
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
+from fixation_gym.geometry.boxes import Box
 from fixation_gym.robot import CAMERA_FOVY
 from fixation_gym.types import FloatArray, MaskArray
 
+_CLEAR = 0.45
+"""Opacity up to which glass leaves the target its colour."""
 _ASPECT = 4.0 / 3.0
 """Width of the wrist image by its height."""
 
 
 def visible_share(camera: FloatArray, target: TargetSpec, obstacles: list[ObstacleSpec]) -> float:
-    """Share of the target's box that is in view past all that is not glass, 0..1."""
+    """Share of the target's box that is in view past all that is not clear glass, 0..1."""
     half = np.array(target_shape(target.shape).half_extent) * target.scale
     steps = np.array([(x, y, z) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7) for z in (-0.6, 0.6)])
     points = target.box.centre + (steps * half) @ target.box.rotation.T
@@ -45,12 +47,12 @@ def passes_through(box: Box, camera: FloatArray, point: FloatArray) -> bool:
 
 
 def _hidden(camera: FloatArray, points: FloatArray, obstacles: list[ObstacleSpec]) -> MaskArray:
-    """Points, shape (n, 3), whose line of sight meets something that is not glass."""
+    """Points, shape (n, 3), whose line of sight meets something that is not clear glass."""
     hidden = np.zeros(len(points), dtype=bool)
     for obstacle in obstacles:
         boxes = obstacle.shape.boxes(obstacle.position, obstacle.yaw)
         for part, centre, rotation, half in zip(obstacle.shape.parts, *boxes, strict=True):
-            if part.finish != "glass":
+            if part.finish != "glass" or obstacle.rgba[3] > _CLEAR:
                 hidden |= _crossed(camera, points, centre, rotation, half)
     return hidden
 

@@ -32,7 +32,7 @@ class ServoGains:
     """lambda_obs of Eq. 8: speed around the target per metre that the camera is off its way, 1/s."""
     turn_speed: float = 0.13
     """Largest speed around the target, m/s."""
-    orbit_distance: float = 0.43
+    orbit_distance: float = 0.47
     """The camera goes around the target at this distance at least, m: farther out than what stands there."""
     on_way: float = math.radians(7.0)
     """Angle to its way within which the hand goes in, rad."""
@@ -48,8 +48,12 @@ class ServoGains:
     """Evidence in the corridor (points times frames) that stops the approach; less slows it down."""
     retreat_gap: float = 0.08
     """An obstacle nearer than this before the finger tips makes the hand retreat, m."""
-    retreat_speed: float = 0.05
+    retreat_speed: float = 0.08
     """Speed of retreats, m/s."""
+    hand_room: float = 0.03
+    """What is nearer to the hand than this, in view or not, makes it back off, m."""
+    search_climb: float = 0.06
+    """Speed at which the search rises while no way was chosen yet, m/s."""
     fixate_seconds: float = 0.8
     """Shortest time of looking before the approach: obstacles have to move in the image to be seen, s."""
     fixate_relative_std: float = 0.05

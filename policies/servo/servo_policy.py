@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.control import gaze, open_loop, servo_laws
+from fixation_gym.control.corridor import near_hand
 from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
 from fixation_gym.control.open_loop import Manoeuvre, Stage, Target
 from fixation_gym.control.ways import (
@@ -42,6 +43,8 @@ _FAR_OFF = 0.5
 
 _OWN_RADIUS = 0.05
 """Points so near to the fixated point are the target's own, m."""
+_INNER = 0.34
+"""Nearer to the target than this the hand is among what stands around it, m."""
 _HIDING = 0.06
 """A thing hides what is behind it if it is nearer by this share."""
 _ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -190,6 +193,14 @@ class ServoPolicy:
             self._on_way_since = percept.time
         return direction, angle
 
+    def _is_close(self, percept: Percept, T_base_cam: FloatArray) -> bool:
+        """Whether something is next to the hand, while it goes around; on its way in, the corridor says more."""
+        if percept.fixation.distance_m < _INNER:
+            return False
+        points, evidence = self._obstacle_points(percept)
+        beside = near_hand(transform(inverse(T_base_cam), points), self.gains.hand_room)
+        return bool(evidence[beside].sum() > 0.5 * self.gains.obstacle_evidence)
+
     def _may_enter(self, time: float) -> bool:
         """Whether the hand may go in on its way: it was looked at, or looking longer did not help."""
         if not self._avoid_obstacles:
@@ -261,9 +272,12 @@ class ServoPolicy:
         if not fixation.initialised and support is not None:  # the target is somewhere on the table
             distance = (T_base_cam[2, 3] - support) / max(math.sin(gaze.elevation(T_base_cam)), 0.1)
         lateral = np.zeros(2)
-        if fixation.initialised and self._way is not None:
+        if self._way is None:
+            lateral = np.array([0.0, -gains.search_climb])
+        elif fixation.initialised:
             direction, angle = self._choose_way(percept, T_base_cam, blocked=False)
             lateral = direction * min(gains.turn_gain * distance * angle, gains.turn_speed)
+        if fixation.initialised:
             lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
         back = -gains.search_retreat_speed if distance < gains.search_distance else 0.0
         expected = np.clip(fixation.centroid, -_FAR_OFF, _FAR_OFF) if fixation.initialised else np.zeros(2)
@@ -277,10 +291,13 @@ class ServoPolicy:
         direction, angle = np.zeros(2), 0.0
         if self._phase is Phase.APPROACH:
             direction, angle = self._choose_way(percept, T_base_cam, certainty == 1.0)
-        near = min(1.0, max(0.2, (fixation.distance_m - 0.30) / (gains.orbit_distance - 0.30)))
         speed = min(gains.turn_gain * fixation.distance_m * angle, gains.turn_speed)
-        if angle > gains.on_way:
-            speed *= near  # farther in, the hand must not swing into what stands beside its way
+        if angle > gains.on_way:  # farther in, the hand must not swing into what stands beside its way
+            far = (fixation.distance_m - _INNER) / (gains.orbit_distance - _INNER)
+            speed *= min(1.0, max(0.1, far))
+        close = self._is_close(percept, T_base_cam)
+        if close:
+            speed *= 0.3
         lateral = servo_laws.lateral_velocity(
             fixation.distance_m,
             gains.desired_distance,
@@ -292,7 +309,8 @@ class ServoPolicy:
             direction,
         )
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
-        v = np.array([*lateral, self._forward_speed(percept, obstacle, certainty, angle)])
+        forward = self._forward_speed(percept, obstacle, certainty, angle)
+        v = np.array([*lateral, -gains.retreat_speed if close else forward])
         roll_error = self._roll_error(percept, T_base_cam, certainty)
         return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, gains.gaze)
 

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from fixation_gym.control.corridor import Box, approach_directions, free_directions, in_corridor
+from fixation_gym.control.corridor import approach_directions, free_directions, in_corridor
 from fixation_gym.control.obstacle_term import obstacle_term
+from fixation_gym.geometry.boxes import Box
 
 ABOVE = np.array([[0.0, 1e-6, 1.0]])
 TARGET = np.array([0.5, 0.0, 0.0])

@@ -45,7 +45,12 @@ def test_within_reach_every_direction_is_free(lateral):
 
 @pytest.mark.parametrize(
     ("view", "outward", "inward"),
-    [((85, 50), (0.1, 0.0), (-0.1, 0.0)), ((-10, 50), (-0.1, 0.0), (0.1, 0.0)), ((40, 86), (0.0, -0.1), (0.0, 0.1))],
+    [
+        ((106, 50), (0.1, 0.0), (-0.1, 0.0)),
+        ((10, 50), (-0.1, 0.0), (0.1, 0.0)),
+        ((40, 87), (0.0, -0.1), (0.0, 0.1)),
+        ((60, 36), (0.0, 0.1), (0.0, -0.1)),
+    ],
 )
 def test_at_the_limits_only_the_way_out_is_barred(view, outward, inward):
     pose = camera(*view)

@@ -1,0 +1,86 @@
+import math
+
+import numpy as np
+import pytest
+
+from fixation_gym.control.reach import REACH_GRID, azimuth_range, directions, sample_direction
+from fixation_gym.control.ways import SeenSpace, WayCosts, chosen_way, known_ways, lateral_direction, way_costs
+from fixation_gym.geometry.rigid import look_at
+
+TARGET = np.array([0.55, 0.08, -0.08])
+BEARING = math.atan2(TARGET[1], TARGET[0])
+COSTS = WayCosts()
+NONE = np.zeros((0, 3))
+
+
+def way_at(azimuth_deg, elevation_deg):
+    return directions(np.radians([[azimuth_deg, elevation_deg]]), TARGET)[0]
+
+
+def everything_seen():
+    space = SeenSpace.empty(BEARING)
+    return space.with_seen(np.ones_like(space.seen))
+
+
+def post_at(way, distance=0.15, count=8):
+    """Points of an upright post under a way, each surely seen."""
+    place = TARGET + distance * way
+    heights = np.linspace(-0.10, place[2], count)
+    return np.column_stack([np.repeat(place[None, :2], count, axis=0), heights]), np.full(count, 20.0)
+
+
+def test_without_obstacles_and_with_all_seen_the_present_way_is_taken():
+    ways = known_ways(NONE, np.zeros(0), TARGET, everything_seen(), 0.01)
+    present = way_at(60, 55)
+    best = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS), None, COSTS)
+    assert math.degrees(math.acos(ways.directions[best] @ present)) < 5.0
+
+
+def test_a_post_in_the_way_turns_the_hand_to_one_side():
+    present = way_at(60, 45)
+    points, weights = post_at(present)
+    ways = known_ways(points, weights, TARGET, everything_seen(), 0.01)
+    assert ways.evidence[ways.nearest(present)] > 90.0
+    best = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS), None, COSTS)
+    assert ways.evidence[best] < 30.0
+
+
+def test_what_was_never_looked_at_is_shunned_and_so_is_what_was_tried():
+    present = way_at(60, 60)
+    nothing, everything = (
+        known_ways(NONE, np.zeros(0), TARGET, s, 0.01) for s in (SeenSpace.empty(0), everything_seen())
+    )
+    blind, sighted = (way_costs(ways, present, NONE, 60.0, COSTS) for ways in (nothing, everything))
+    np.testing.assert_allclose(blind - sighted, COSTS.unseen)
+    tried = way_costs(everything, present, present[None], 60.0, COSTS)
+    near = everything.directions @ present > math.cos(math.radians(10.0))
+    assert np.all(tried[near] - sighted[near] == pytest.approx(COSTS.tried))
+    assert np.sum(tried != sighted) < 0.4 * len(tried)
+
+
+def test_a_way_is_kept_while_no_other_is_clearly_cheaper():
+    cost = np.array([0.5, 0.45, 0.1])
+    assert chosen_way(cost, 0, COSTS) == 2
+    assert chosen_way(cost[:2], 0, COSTS) == 0
+
+
+@pytest.mark.parametrize("way", [(20, 70), (100, 60), (60, 84), (60, 42)])
+def test_the_lateral_direction_leads_to_the_way(way):
+    camera = TARGET + 0.45 * way_at(60, 60)
+    pose = look_at(camera, TARGET, np.array([0.0, 0.0, 1.0]))
+    direction, angle = lateral_direction(pose, way_at(60, 60), way_at(*way))
+    moved = camera + pose[:3, :2] @ direction * 0.05 - TARGET
+    after = math.acos(moved @ way_at(*way) / np.linalg.norm(moved))
+    assert after == pytest.approx(angle - 0.05 / 0.45, abs=0.01)
+
+
+def test_directions_are_drawn_evenly_over_the_reach():
+    rng = np.random.default_rng(0)
+    drawn = np.array([sample_direction(rng) for _ in range(2000)])
+    for azimuth, elevation in drawn:
+        low, high = azimuth_range(elevation)
+        assert low <= azimuth <= high
+    cells = np.argmax(directions(drawn, TARGET) @ directions(REACH_GRID, TARGET).T, axis=1)
+    counts = np.bincount(cells, minlength=len(REACH_GRID))
+    assert counts.max() < 4.0 * counts.mean()
+    assert np.mean(counts == 0) < 0.05
