@@ -45,6 +45,8 @@ _OWN_RADIUS = 0.05
 """Points so near to the fixated point are the target's own, m."""
 _INNER = 0.34
 """Nearer to the target than this the hand is among what stands around it, m."""
+_BACKING_OFF = 0.05
+"""The camera goes around more slowly the farther it is within its distance for that, not at all from here on, m."""
 _HIDING = 0.06
 """A thing hides what is behind it if it is nearer by this share."""
 _ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -293,8 +295,8 @@ class ServoPolicy:
             direction, angle = self._choose_way(percept, T_base_cam, certainty == 1.0)
         speed = min(gains.turn_gain * fixation.distance_m * angle, gains.turn_speed)
         if angle > gains.on_way:  # farther in, the hand must not swing into what stands beside its way
-            far = (fixation.distance_m - _INNER) / (gains.orbit_distance - _INNER)
-            speed *= min(1.0, max(0.1, far))
+            far = 1.0 - (gains.orbit_distance - fixation.distance_m) / _BACKING_OFF
+            speed *= min(1.0, max(0.05, far))
         close = self._is_close(percept, T_base_cam)
         if close:
             speed *= 0.3
@@ -319,9 +321,7 @@ class ServoPolicy:
         gains, distance = self.gains, percept.fixation.distance_m
         if certainty == 1.0 and obstacle.gap < gains.retreat_gap:
             return -gains.retreat_speed
-        if self._phase is not Phase.APPROACH:
-            return 0.0
-        if angle > gains.on_way or certainty == 1.0:
+        if self._phase is not Phase.APPROACH or angle > gains.on_way or certainty == 1.0:
             return -gains.retreat_speed if distance < gains.orbit_distance else 0.0
         if not self._may_enter(percept.time):
             return 0.0
