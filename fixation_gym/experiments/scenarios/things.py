@@ -32,8 +32,8 @@ _HIDDEN = 0.1
 """Largest share of a thing that another one hides at the start."""
 _GAP = 0.01
 """Between things, m."""
-_LOW = 0.05
-"""Parts whose middle is lower than this must be above the table, m."""
+_LOW = 0.01
+"""Parts that reach as low as this stand on the table: their middle must be over it, m."""
 _SCALES = {True: (0.4, 0.75), False: (0.7, 1.1)}
 """Of things in front and behind, so that sizes in the image do not differ as much as distances."""
 _LOWEST_ROW = 0.36
@@ -184,7 +184,8 @@ def fulfils(view: SceneView, wish: Wish, obstacle: ObstacleSpec) -> bool:
 def has_room(view: SceneView, obstacle: ObstacleSpec, others: list[BoxSet]) -> bool:
     """Whether a thing is on the table and keeps clear of the others and of the hand."""
     boxes = obstacle.boxes
-    low = boxes.centres[boxes.centres[:, 2] < TABLE_HEIGHT + _LOW]
+    lower_edges = boxes.centres[:, 2] - np.einsum("nj,nj->n", np.abs(boxes.rotations[:, 2]), boxes.halves)
+    low = boxes.centres[lower_edges < TABLE_HEIGHT + _LOW]
     on_table = np.all((low[:, 0] > 0.18) & (low[:, 0] < 0.94)) and np.all(np.abs(low[:, 1]) < 0.38)
     if not on_table or any(boxes_meet(boxes, other, _GAP) for other in others):
         return False

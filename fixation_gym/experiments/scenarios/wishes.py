@@ -6,7 +6,7 @@ import numpy as np
 
 from fixation_gym.experiments.scenarios.things import Wish
 
-_SIDE, _BORDER = (0.10, 0.26), (0.30, 0.46)
+_SIDE, _BORDER = (0.08, 0.40), (0.30, 0.46)
 """Horizontal image position of things, normalised; the image ends at 0.52."""
 _TOLD = 0.5
 """Of the things in front of a target without a stand, the share that the table alone tells."""
