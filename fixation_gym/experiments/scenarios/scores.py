@@ -130,6 +130,8 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
             "front": count(asked & front),
             "front_called": count(asked & front & called),
             "called": count(asked & called),
+            "surface": count(asked & truth.places["obstacle"] & ~truth.image),
+            "surface_right": count(asked & truth.places["obstacle"] & ~truth.image & right),
             "inner_obstacle": count(asked & truth.inner & truth.places["obstacle"]),
             "inner_obstacle_right": count(asked & truth.inner & truth.places["obstacle"] & right),
             "image": count(asked & truth.image),

@@ -18,6 +18,7 @@ MEASURES = {
     "table_sign_accuracy": ("on_table_right", "on_table"),
     "room_sign_accuracy": ("on_room_right", "on_room"),
     "inner_sign_accuracy": ("inner_right", "inner"),
+    "surface_sign_accuracy": ("surface_right", "surface"),
     "inner_obstacle_sign_accuracy": ("inner_obstacle_right", "inner_obstacle"),
     "front_recall": ("front_called", "front"),
     "front_precision": ("front_called", "called"),
@@ -25,7 +26,8 @@ MEASURES = {
     "inner_image_behind": ("inner_image_behind", "inner_image"),
     "obstacle_share": ("on_obstacle", "asked"),
 }
-"""Ratios of pixel counts summed over the instances; pixels without evidence do not count."""
+"""Ratios of pixel counts summed over the instances; pixels without evidence do not count. ``surface``: of obstacles, but
+for images in mirrors."""
 FIRST_CALL_S = 0.5
 _RESAMPLES = 1000
 ALL = "all"
@@ -163,6 +165,7 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
 _COLUMNS = {
     "sign": "sign_accuracy",
     **{place: f"{place}_sign_accuracy" for place in ("obstacle", "table", "room")},
+    "surface": "surface_sign_accuracy",
     "inner": "inner_sign_accuracy",
     "inner obs": "inner_obstacle_sign_accuracy",
     "recall": "front_recall",
