@@ -26,8 +26,8 @@ MEASURES = {
     "inner_image_behind": ("inner_image_behind", "inner_image"),
     "obstacle_share": ("on_obstacle", "asked"),
 }
-"""Ratios of pixel counts summed over the instances; pixels without evidence do not count. ``surface``: of obstacles, but
-for images in mirrors."""
+"""Ratios of pixel counts summed over the instances; pixels without evidence do not count. ``surface``: of obstacles,
+but for images in mirrors."""
 FIRST_CALL_S = 0.5
 _RESAMPLES = 1000
 ALL = "all"

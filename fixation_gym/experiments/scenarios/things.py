@@ -174,11 +174,17 @@ def fulfils(view: SceneView, wish: Wish, obstacle: ObstacleSpec) -> bool:
         return False
     if wish.across and not view.is_across(obstacle):
         return False
-    if wish.in_front and wish.kind != "translucent" and hides(view, sight):
+    if wish.in_front and hides(view, sight if wish.kind != "translucent" else _holder_sight(view, obstacle)):
         return False
     if not wish.in_front or wish.told is None:
         return True
     return sight.low_share > _TOLD if wish.told else sight.low_share < _NOT_TOLD
+
+
+def _holder_sight(view: SceneView, obstacle: ObstacleSpec) -> Sight | None:
+    """What is seen of what holds a see-through thing up, its solid parts; None if it stands on the table."""
+    parts = tuple(part for part in obstacle.shape.parts if part.finish == "solid")
+    return view.sight(replace(obstacle, shape=replace(obstacle.shape, parts=parts))) if parts else None
 
 
 def has_room(view: SceneView, obstacle: ObstacleSpec, others: list[BoxSet]) -> bool:
@@ -192,8 +198,10 @@ def has_room(view: SceneView, obstacle: ObstacleSpec, others: list[BoxSet]) -> b
     return view.has_room_for_hand(boxes)
 
 
-def hides(view: SceneView, sight: Sight) -> bool:
+def hides(view: SceneView, sight: Sight | None) -> bool:
     """Whether a thing comes too near to the line of sight to the target."""
+    if sight is None or not len(sight.places):
+        return False
     return bool(np.hypot(*sight.places.T).min() < _TARGET_ROOM / view.depth)
 
 

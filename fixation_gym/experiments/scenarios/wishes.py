@@ -8,7 +8,7 @@ from fixation_gym.experiments.scenarios.things import Wish
 
 _SIDE, _BORDER = (0.08, 0.40), (0.30, 0.46)
 """Horizontal image position of things, normalised; the image ends at 0.52."""
-_TOLD = 0.5
+_TOLD = 0.15
 """Of the things in front of a target without a stand, the share that the table alone tells."""
 _HIGHEST_ROW, _TOLD_ROWS = -0.33, (0.05, 0.30)
 """Normalised row of the middle of the highest things, and rows where the table may tell; the image ends at 0.39."""
@@ -45,7 +45,8 @@ def _mirror_scene(variant: str, rise: float, rng: np.random.Generator) -> list[W
     columns = _on_side(sign, _BORDER if variant == "border" else (0.20, 0.30))
     told, row = _told_and_row(rise, True, rng)
     sides = ((True, -sign), (False, -sign), (False, sign))
-    others = [_solid(variant, rise, in_front, side, rng) for in_front, side in sides]
+    beside = "lateral" if variant == "border" else variant  # on the side of the mirror the border is taken
+    others = [_solid(variant if side != sign else beside, rise, in_front, side, rng) for in_front, side in sides]
     return [Wish("mirror", True, columns, row, told), *others]
 
 
