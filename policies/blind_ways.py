@@ -11,6 +11,7 @@ import numpy as np
 from fixation_gym.control.reach import HIGHEST, azimuth_range
 from fixation_gym.types import FloatArray
 from policies.base import SimulatedWorld
+from policies.grips import grips_of, rolls
 from policies.oracle import GRASP_DISTANCE, OraclePolicy
 
 Origin = Literal["base", "view", "target"]
@@ -110,11 +111,12 @@ class BlindWayPolicy(OraclePolicy):
             self._first_view = math.atan2(target[1] - pose[1, 3], target[0] - pose[0, 3])
         azimuths = self._way.azimuths(math.atan2(target[1], target[0]), self._first_view)
         elevation = math.radians(self._way.elevation_deg)
-        directions = np.repeat([_direction(azimuth, elevation) for azimuth in azimuths], len(self._grips), axis=0)
-        grips = np.resize(self._grips, len(directions))
-        detours = np.repeat(np.abs(azimuths - azimuths[0]), len(self._grips))
-        best = int(np.argmin(np.abs(self._rolls(directions, grips)) + _DETOUR_COST * detours))
-        self._azimuth = float(azimuths[best // len(self._grips)])
+        axes = grips_of(self._scene.target.shape)
+        directions = np.repeat([_direction(azimuth, elevation) for azimuth in azimuths], len(axes), axis=0)
+        grips = np.resize(axes, len(directions))
+        detours = np.repeat(np.abs(azimuths - azimuths[0]), len(axes))
+        best = int(np.argmin(np.abs(rolls(directions, grips, self._rotation)) + _DETOUR_COST * detours))
+        self._azimuth = float(azimuths[best // len(axes)])
         return directions[best], int(grips[best])
 
     def come_in(self, depth: float, seconds: float) -> tuple[FloatArray, float]:

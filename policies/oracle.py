@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fixation_gym.control import open_loop, servo_laws
-from fixation_gym.control.corridor import approach_directions, free_directions, level_axes
+from fixation_gym.control.corridor import approach_directions, free_directions
 from fixation_gym.control.reach import reachable_directions
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
@@ -18,15 +18,13 @@ from fixation_gym.geometry.boxes import BoxSet, box_set, joined
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import FloatArray
 from policies.base import Action, Estimate, SimulatedWorld
-
-IntArray = NDArray[np.int64]
+from policies.grips import LARGEST_SLANT, grips_of, half_turn, rolls, slants
 
 VIEW_DISTANCE, GRASP_DISTANCE = 0.42, 0.18
 """Distance of the camera from the target on the way around it, and at the end of the approach, m."""
 _RETREAT_DISTANCE = 0.30
 _SPEED = 0.10
 """Of the approach, m/s."""
-_ROUND_SHAPES = ("cylinder", "ball", "ring")
 _CLOSE_SECONDS = 0.8
 _HELD = 0.045
 """A target whose centre is farther than this from the tool's point is not held, m."""
@@ -151,18 +149,23 @@ class OraclePolicy:
             Unit vector from the target to the camera, shape (3,), in base, and the axis of the target along which the
             fingers close; -1: any.
         """
-        directions = np.repeat(reachable_directions(target), len(self._grips), axis=0)
-        grips = np.resize(self._grips, len(directions))
-        rolls = self._rolls(directions, grips)
+        ways = reachable_directions(target)
+        if self._scene.free_way is not None:  # between those of the grid
+            ways = np.vstack([ways, approach_directions(*np.array(self._scene.free_way)[:, None])])
+        axes = grips_of(self._scene.target.shape)
+        directions = np.repeat(ways, len(axes), axis=0)
+        grips = np.resize(axes, len(directions))
+        turns = rolls(directions, grips, self._rotation)
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
         from_base = np.linalg.norm((target + VIEW_DISTANCE * directions)[:, :2], axis=1)
-        strain = 4.0 * np.maximum(0.0, _FOLDED - from_base) + 0.3 * np.abs(rolls)
+        strain = 4.0 * np.maximum(0.0, _FOLDED - from_base) + 0.3 * np.abs(turns)
         flatness = np.maximum(0.0, np.where(grips < 0, _STEEP, _STEEP_TURNED) - np.arcsin(directions[:, 2]))
         # Flat fingers touch the table, so flatness costs more than the way.
         cost = np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + 1.5 * flatness
         boxes = self._boxes(time)
-        for margin in (0.03, 0.02, 0.01, 0.0):
-            free = free_directions(target, boxes, directions, margin, rolls)
+        held = slants(directions, grips, self._rotation) < LARGEST_SLANT
+        for suitable, margin in product((held, ~held), (0.03, 0.02, 0.01, 0.0)):
+            free = suitable & free_directions(target, boxes, directions, margin, turns)
             if free.any():
                 cost = np.where(free, cost, np.inf)
                 break
@@ -179,20 +182,9 @@ class OraclePolicy:
         return self._direction, _SPEED
 
     @property
-    def _grips(self) -> IntArray:
-        """Axes of the target along which the fingers close on it, shape (n,); -1: all are alike, the hand stays level.
-
-        Both sides of a box fit between the fingers.
-        """
-        shape = self._scene.target.shape
-        return np.array([-1] if shape in _ROUND_SHAPES else [1, 0] if shape == "box" else [1])
-
-    def _rolls(self, directions: FloatArray, grips: IntArray) -> FloatArray:
-        """How far the hand turns about each direction for a grip, shape (n,), rad."""
-        axes = level_axes(directions)
-        matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)
-        across = np.einsum("nij,nj->ni", axes, matrix.T[np.maximum(grips, 0)])
-        return np.where(grips < 0, 0.0, _half_turn(np.arctan2(across[:, 1], across[:, 0])))
+    def _rotation(self) -> FloatArray:
+        """Of the target, shape (3, 3), in base."""
+        return self._env.sim.data.body("target").xmat.reshape(3, 3)
 
     def _boxes(self, time: float) -> BoxSet:
         """Boxes around all places where something will be from now on."""
@@ -229,7 +221,7 @@ class OraclePolicy:
 
     def _back_off(self, axis: FloatArray) -> float:
         """How far before the target's centre the tool stops so that the palm does not touch it, m."""
-        spec, rotation = self._scene.target, self._env.sim.data.body("target").xmat.reshape(3, 3)
+        spec, rotation = self._scene.target, self._rotation
         half = np.array(target_shape(spec.shape).half_extent) * spec.scale
         x, y, z = np.abs(rotation.T @ axis)
         depth = {
@@ -270,9 +262,8 @@ class OraclePolicy:
         if self._phase == "fixate" or self._grip < 0:
             level = math.atan2(pose[2, 0], -pose[2, 1])
             return level * float(np.hypot(pose[2, 0], pose[2, 1]))
-        matrix = self._env.sim.data.body("target").xmat.reshape(3, 3)
-        across = pose[:3, :3].T @ matrix[:, self._grip]
-        return float(_half_turn(math.atan2(across[1], across[0])))
+        across = pose[:3, :3].T @ self._rotation[:, self._grip]
+        return float(half_turn(math.atan2(across[1], across[0])))
 
 
 def _next_direction(pose: FloatArray, target: FloatArray, direction: FloatArray) -> FloatArray:
@@ -284,8 +275,3 @@ def _next_direction(pose: FloatArray, target: FloatArray, direction: FloatArray)
         return direction
     azimuth = math.atan2(-present[1], -present[0])
     return approach_directions(np.array([azimuth]), np.array([wanted]))[0]
-
-
-def _half_turn(angle: Any) -> Any:
-    """Angle or angles, rad, taken to [-pi/2, pi/2): a grip turned by half a turn is the same."""
-    return (angle + math.pi / 2) % math.pi - math.pi / 2
