@@ -105,14 +105,16 @@ def test_a_coloured_frame_is_drawn_in_its_colour_and_all_else_as_before():
         env.reset(seed=1)
         readings.append(env.step(np.zeros(7, np.float32))[0])
         images.append(readings[-1].pop("rgb").astype(np.float32))
-        frame = np.array(env.scene.obstacles[0].frame_rgba[:3])
+        frames = np.array([obstacle.frame_rgba[:3] for obstacle in env.scene.obstacles])
         env.close()
     for name, reading in readings[0].items():
         np.testing.assert_array_equal(reading, readings[1][name], err_msg=name)
     other = np.abs(images[1] - images[0]).max(axis=-1) > 0
-    assert 0.02 < other.mean() < 0.4
-    seen = np.median(images[1][other], axis=0)
-    np.testing.assert_allclose(seen / seen.sum(), frame / frame.sum(), atol=0.1)
+    assert 0.005 < other.mean() < 0.6
+    seen = images[1][other] / images[1][other].sum(axis=-1, keepdims=True)
+    colours = frames / frames.sum(axis=-1, keepdims=True)
+    nearest = np.abs(seen[:, None] - colours).max(axis=-1).min(axis=-1)
+    assert np.mean(nearest < 0.1) > 0.5
 
 
 def test_without_an_image_size_the_rest_of_the_observation_is_the_same():
@@ -146,9 +148,10 @@ def test_what_moves_slowly_does_not_stop():
     env.reset(seed=0)
     for _ in range(12):
         env.step(np.zeros(7))
-    ball, radius = env.sim.data.joint("target_joint"), env.sim.body_position("target")[2]
+    ball, radius = env.sim.data.joint("target_joint"), env.scene.target.box.half_extent[2]
     before = env.sim.body_position("target").copy()
-    ball.qvel[0], ball.qvel[4] = 0.01, 0.01 / radius  # rolling along x
+    ball.qvel[0] = 0.01  # rolling along x; spins are about the body's own axes
+    ball.qvel[3:6] = env.sim.data.body("target").xmat.reshape(3, 3).T @ [0.0, 0.01 / radius, 0.0]
     for _ in range(5):
         env.step(np.zeros(7))
     assert env.sim.body_position("target")[0] - before[0] == pytest.approx(0.2 * 0.01, rel=0.2)

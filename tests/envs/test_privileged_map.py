@@ -21,16 +21,18 @@ def test_cells_hold_the_share_that_is_nearer():
 
 
 def test_obstacles_are_seen_at_their_distance_whatever_they_are_made_of_and_nothing_else_is():
-    kinds = ("opaque", "translucent", "mirror")
-    scenario = {"obstacle_kinds": kinds, "obstacle_count": (1, 3), "alpha": (0.3, 0.3)}
+    kinds = ("mirror", "opaque", "translucent")
+    scenario = {"obstacle_materials": kinds, "obstacle_count": (2, 6), "alpha": (0.3, 0.3)}
     env = make_zfc_env("privileged", scenario=scenario, image_size=SIZE)
     base, looked = env.unwrapped, set()
-    for seed in range(12):
+    for seed in range(16):
         obs, info = env.reset(seed=seed)
         pose = base.sim.arm_state().camera_pose
         depth = env._truth.depth(base.data)
         camera = base.intrinsics.scaled(*depth.shape)
         for obstacle in base.scene.obstacles:
+            if obstacle.shape.name != "thing":
+                continue  # the middle of others may be hollow
             centre = pose[:3, :3].T @ (np.array(obstacle.position) - pose[:3, 3])
             column, row = np.rint(camera.project(centre)).astype(int)
             if not (0 <= column < camera.width and 0 <= row < camera.height):
@@ -38,8 +40,6 @@ def test_obstacles_are_seen_at_their_distance_whatever_they_are_made_of_and_noth
             looked.add(obstacle.kind)
             reach = np.linalg.norm(obstacle.box.half_extent)
             assert depth[row, column] < centre[2] + reach
-            if len(base.scene.obstacles) == 1:
-                assert depth[row, column] > centre[2] - reach
             if depth[row, column] < info["distance_true_m"]:
                 assert obs["true_map"][0, row * 32 // camera.height, column * 32 // camera.width] > 0
     assert looked == set(kinds)
