@@ -43,7 +43,7 @@ from policies.blind_ways import BlindWay
 
 SCENES = 12
 """Scenes per scenario of the geometric test."""
-MOST_OPEN, MOST_OPEN_IN_ALL = 0.75, 0.45
+MOST_OPEN, MOST_OPEN_IN_ALL = 0.75, 0.40
 """Largest share of scenes in which one direction is open: of the scenes of one scenario, and of all."""
 CONFIG = NecessityConfig(scenarios=("opaque", "bin"), quick=True)
 
@@ -146,6 +146,8 @@ def test_one_way_for_all_scenarios_is_chosen_too_and_an_agent_has_its_column():
     table = summarise([*first, *second], ("a", "b"))["table"]
     assert [row["scenario"] for row in table] == ["bin", "opaque", "all"]
     assert [row["best"] for row in table] == ["a", "b", "b"]
+    assert table[-1]["best_low"] is None
+    assert "9/20  45%  " in format_table(table)
     assert (table[-1]["best_k"], table[-1]["best_n"], table[-1]["agent_k"]) == (9, 20, 7)
 
 
@@ -258,7 +260,7 @@ def open_shares(name: str) -> np.ndarray:
     """Share of scenes in which nothing that stands bars a direction of the reach's grid, shape (n,)."""
     found = np.zeros(len(REACH_GRID))
     for seed in range(SCENES):
-        scene = sample_scene(SCENARIOS[name], np.random.default_rng([seed, 11]))
+        scene = sample_scene(SCENARIOS[name], np.random.default_rng([seed, zlib.crc32(name.encode())]))
         target = scene.target.places[-1]
         boxes = joined([obstacle.boxes for obstacle in scene.obstacles if obstacle.motion is None])
         found += free_directions(target, boxes, reachable_directions(target), 0.0)

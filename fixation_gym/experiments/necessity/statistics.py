@@ -14,7 +14,8 @@ Row = dict[str, Any]
 AGENT = "agent"
 """Name of the column of the agent, and how its member's name begins."""
 ALL = "all"
-"""Name of the row of the best way for all scenarios at once."""
+"""Name of the row of the best way for all scenarios at once. It has no intervals: scenes of the same seed have much in
+common, such as the free way, whatever the scenario."""
 COMPARED = ("blind", "blind:slow", AGENT, "oracle")
 """Columns beside the best way, as far as there are such episodes."""
 
@@ -39,9 +40,9 @@ class Counts:
         """Share of successes; None without episodes."""
         return self.k / self.n if self.n else None
 
-    def columns(self, name: str) -> Row:
-        """Counts, rate and its 95 % interval as columns of a table."""
-        low, high = wilson_interval(self.k, self.n)
+    def columns(self, name: str, independent: bool = True) -> Row:
+        """Counts, rate and, if the episodes are independent, its 95 % interval as columns of a table."""
+        low, high = wilson_interval(self.k, self.n) if independent else (None, None)
         return {
             f"{name}_k": self.k,
             f"{name}_n": self.n,
@@ -129,14 +130,14 @@ def _table_row(scenario: str, tallies: Mapping[str, Tally], ways: Sequence[str])
     best = best_way(tallies, ways)
     highest = max(ways, key=lambda way: tallies[way].whole.rate or 0.0)
     row: Row = {"scenario": scenario, "best": best}
-    row |= tallies[best].judged_on.columns("best")
+    row |= tallies[best].judged_on.columns("best", scenario != ALL)
     row |= {"chosen_on_k": tallies[best].chosen_on.k, "chosen_on_n": tallies[best].chosen_on.n}
     # Chosen and judged on the same seeds, so too high.
     row |= {"hindsight": highest, "hindsight_k": tallies[highest].whole.k, "hindsight_n": tallies[highest].whole.n}
     for name in COMPARED:
         for member in tallies:
             if member == name or (name == AGENT and member.startswith(f"{AGENT}:")):
-                row |= tallies[member].whole.columns(name)
+                row |= tallies[member].whole.columns(name, scenario != ALL)
     return row
 
 
@@ -157,5 +158,7 @@ def format_table(table: Sequence[Row]) -> str:
 def _rate(row: Row, name: str) -> str:
     if not row.get(f"{name}_n"):
         return "-"
-    low, high = 100.0 * row[f"{name}_low"], 100.0 * row[f"{name}_high"]
-    return f"{row[f'{name}_k']}/{row[f'{name}_n']}  {100.0 * row[f'{name}_rate']:.0f}% [{low:.0f}, {high:.0f}]"
+    text = f"{row[f'{name}_k']}/{row[f'{name}_n']}  {100.0 * row[f'{name}_rate']:.0f}%"
+    if row[f"{name}_low"] is None:
+        return text
+    return f"{text} [{100.0 * row[f'{name}_low']:.0f}, {100.0 * row[f'{name}_high']:.0f}]"
