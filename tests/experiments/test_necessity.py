@@ -35,7 +35,7 @@ from fixation_gym.experiments.necessity.run import (
     run_cell,
     scenarios_with_obstacles,
 )
-from fixation_gym.experiments.necessity.statistics import Counts, Tally, format_table, summarise
+from fixation_gym.experiments.necessity.statistics import format_table, summarise
 from fixation_gym.experiments.necessity.ways import ELEVATIONS, QUICK_WAYS, STRAIGHT, WAYS, azimuth_cells
 from fixation_gym.geometry.boxes import joined
 from policies import catalogue
@@ -149,12 +149,6 @@ def test_one_way_for_all_scenarios_is_chosen_too_and_an_agent_has_its_column():
     assert table[-1]["best_low"] is None
     assert "9/20  45%  " in format_table(table)
     assert (table[-1]["best_k"], table[-1]["best_n"], table[-1]["agent_k"]) == (9, 20, 7)
-
-
-def test_counts_add_up():
-    total = sum([Tally(Counts(1, 2), Counts(0, 3), 1)] * 2, start=Tally())
-    assert (total.whole, total.collisions) == (Counts(2, 10), 2)
-    assert Counts().rate is None
 
 
 # -- the command -------------------------------------------------------------------------------------------------------
