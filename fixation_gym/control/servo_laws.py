@@ -48,6 +48,12 @@ def approach_speed(distance: float, desired_distance: float, gain: float) -> flo
     return gain * math.log(distance / desired_distance)
 
 
+def cyclic_velocity(time: float, amplitude: float, rate: float) -> FloatArray:
+    """Lateral velocity (v_X, v_Y), m/s, of a circle of radius ``amplitude`` m at ``rate`` rad/s (term of Eq. 8)."""
+    phase = rate * time
+    return amplitude * rate * np.array([math.sin(phase), math.cos(phase)])
+
+
 def lateral_velocity(
     distance: float,
     desired_distance: float,
@@ -58,7 +64,7 @@ def lateral_velocity(
     obstacle_gain: float,
     obstacle: FloatArray,
 ) -> FloatArray:
-    """(v_X, v_Y), m/s: climb while far, cycle so that distance stays observable, shun obstacles (Eq. 8).
+    """(v_X, v_Y), m/s: move while far, cycle so that distance stays observable, avoid obstacles (Eq. 8).
 
     Args:
         distance: estimated Z_f, m.
@@ -70,8 +76,7 @@ def lateral_velocity(
         obstacle_gain: speed per unit of ``obstacle``, m/s.
         obstacle: obs_xy, shape (2,): where the obstacles are in the image, length at most 1.
     """
-    phase = cycle_rate * time
-    cycle = cycle_amplitude * cycle_rate * np.array([math.sin(phase), math.cos(phase)])
+    cycle = cyclic_velocity(time, cycle_amplitude, cycle_rate)
     return np.asarray(distance_gain) * (distance - desired_distance) + cycle - obstacle_gain * np.asarray(obstacle)
 
 

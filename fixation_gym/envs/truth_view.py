@@ -61,7 +61,7 @@ class TruthView:
         self._option.sitegroup[:] = 0
         self._option.geomgroup[:] = 0
         self._option.geomgroup[scene_mjcf.VISIBLE_GROUP] = 1
-        self._mirrors = np.flatnonzero(model.geom_matid == model.mat(mirror_material).id)
+        self._mirror_material = model.mat(mirror_material).id
         x, y = intrinsics.grid
         self._rays = np.stack([x, -y, -np.ones_like(x)], axis=-1)  # MuJoCo's cameras look along -z, y up
         atexit.register(self.close)
@@ -81,7 +81,8 @@ class TruthView:
             model.geom_group[glass] = scene_mjcf.HIDDEN_GROUP
             behind = self._depth()
             model.geom_group[glass] = scene_mjcf.VISIBLE_GROUP
-        image_depth, image_geom = self._reflected(geom)
+        mirrors = np.flatnonzero(model.geom_matid == self._mirror_material)  # a scene decides which parts they are
+        image_depth, image_geom = self._reflected(geom, mirrors)
         return Truth(depth, geom, behind, image_depth, image_geom)
 
     def _update(self) -> None:
@@ -106,10 +107,10 @@ class TruthView:
         is_geom = found[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM)
         return np.where(is_geom, found[..., 0], NOTHING).astype(np.int32)
 
-    def _reflected(self, geom: GeomArray) -> tuple[FloatArray, GeomArray]:
+    def _reflected(self, geom: GeomArray, mirrors: NDArray[np.intp]) -> tuple[FloatArray, GeomArray]:
         """Depth and geom of what mirrors show, by following rays; also sees the robot's stand-in, as images do."""
         depth, shown = np.full(geom.shape, np.nan), np.full(geom.shape, NOTHING, np.int32)
-        mirror_pixels: MaskArray = np.isin(geom, self._mirrors)
+        mirror_pixels: MaskArray = np.isin(geom, mirrors)
         if not mirror_pixels.any():
             return depth, shown
         data, groups = self._data, np.zeros(mujoco.mjNGROUP, np.uint8)

@@ -12,14 +12,6 @@ from fixation_gym.control import gaze, open_loop, servo_laws
 from fixation_gym.control.corridor import near_hand
 from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
 from fixation_gym.control.open_loop import Manoeuvre, Stage, Target
-from fixation_gym.control.ways import (
-    SeenSpace,
-    Ways,
-    chosen_way,
-    known_ways,
-    lateral_direction,
-    way_costs,
-)
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
 from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.grasp_axis import narrow_axis
@@ -28,7 +20,6 @@ from fixation_gym.perception.obstacle_memory import (
     ObstacleMemory,
     believed_points,
     remember,
-    seen_places,
 )
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
@@ -37,6 +28,7 @@ from fixation_gym.types import Command, FloatArray, Observation
 from policies.base import Action, Estimate
 from policies.servo.gains import ServoGains
 from policies.servo.phases import Phase, Situation, next_phase
+from policies.servo.way_search import Obstacles, WaySearch
 
 _FAR_OFF = 0.5
 """Offset from the image centre beyond which the direction to the target is all that counts, normalised coordinates."""
@@ -47,8 +39,6 @@ _INNER = 0.34
 """Nearer to the target than this the hand is among what stands around it, m."""
 _BACKING_OFF = 0.05
 """The camera goes around more slowly the farther it is within its distance for that, not at all from here on, m."""
-_HIDING = 0.06
-"""A thing hides what is behind it if it is nearer by this share."""
 _ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 """Twist of a camera that turns about its optical axis, rad/s."""
 
@@ -56,8 +46,7 @@ _ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 class ServoPolicy:
     """The scripted baseline: gaze, approach and lateral laws (Eqs. 6-8), then an open-loop grasp.
 
-    State: perception, obstacle memory, what was looked at, the way taken and those tried in vain, phase, and the
-    open-loop manoeuvre if there is one.
+    State: perception, obstacle memory, the search for a way, phase, and the open-loop manoeuvre if there is one.
     """
 
     def __init__(
@@ -92,11 +81,7 @@ class ServoPolicy:
         self._last_seen = -math.inf
         self._manoeuvre: Manoeuvre | None = None
         self._grasps = 0
-        self._seen: SeenSpace | None = None
-        self._ways: Ways | None = None
-        self._way: int | None = None
-        self._on_way_since = math.inf
-        self._tried = np.zeros((0, 3))
+        self._search = WaySearch(self.gains)
         self.percept = self.estimate = None
 
     def act(self, obs: Mapping[str, Any]) -> Action:
@@ -124,7 +109,8 @@ class ServoPolicy:
         """Command for the next control period, for a robot loop that updates its own perception."""
         T_base_cam = pose_to_matrix(observation.camera_pose)
         self._remember_obstacles(percept)
-        obstacle = self._obstacle_term(percept, T_base_cam)
+        obstacles = self._obstacles(percept)
+        obstacle = self._obstacle_term(percept, T_base_cam, obstacles)
         self._advance(percept, observation, T_base_cam, obstacle)
         fixation = percept.fixation
         phase = self._phase if self._manoeuvre is None else self._manoeuvre.stage
@@ -134,7 +120,8 @@ class ServoPolicy:
         elif not fixation.initialised:
             distance = (math.nan, fixation.distance_std_m)
         self.estimate = Estimate(*distance, phase.value)
-        return Command(self._twist(percept, T_base_cam, obstacle), open_loop.gripper_command(self._manoeuvre))
+        twist = self._twist(percept, T_base_cam, obstacles, obstacle)
+        return Command(twist, open_loop.gripper_command(self._manoeuvre))
 
     # -- obstacles -----------------------------------------------------------------------------------------------
 
@@ -144,73 +131,35 @@ class ServoPolicy:
         centred = float(np.linalg.norm(percept.fixation.centroid)) < self.gains.grasp_centred
         looking = centred and self._manoeuvre is None and self._phase is not Phase.SEARCH
         if looking and percept.flow.valid:
-            test, camera, T_base_cam = percept.zfc, percept.flow.intrinsics, percept.T_base_cam
             self._memory = remember(
                 self._memory,
-                test,
-                camera,
-                T_base_cam,
+                percept.zfc,
+                percept.flow.intrinsics,
+                percept.T_base_cam,
                 percept.flow.time,
                 self._memory_settings,
                 self._perception.support_height_m,
             )
-            target = percept.fixation.point_base
-            if self._seen is None:
-                self._seen = SeenSpace.empty(math.atan2(target[1], target[0]))
-            places = self._seen.places(target)
-            self._seen = self._seen.with_seen(seen_places(places, test, camera, T_base_cam, _HIDING))
+            self._search.look(percept)
 
-    def _obstacle_points(self, percept: Percept) -> tuple[FloatArray, FloatArray]:
-        """Points of obstacles that are believed, shape (n, 3), in base, m, and their evidence, shape (n,)."""
+    def _obstacles(self, percept: Percept) -> Obstacles:
+        """What is believed to stand there, without the target's own points."""
         points, evidence = believed_points(self._memory, self._memory_settings)
         others = np.linalg.norm(points - percept.fixation.point_base, axis=1) > _OWN_RADIUS
         others &= self._avoid_obstacles
-        return points[others], evidence[others]
+        return Obstacles(points[others], evidence[others])
 
-    def _obstacle_term(self, percept: Percept, T_base_cam: FloatArray) -> ObstacleTerm:
-        points, evidence = self._obstacle_points(percept)
-        in_camera = transform(inverse(T_base_cam), points)
+    def _obstacle_term(self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles) -> ObstacleTerm:
+        in_camera = transform(inverse(T_base_cam), obstacles.points)
         depth = percept.fixation.distance_m
-        return obstacle_term(in_camera, evidence, depth, TOOL_IN_CAMERA[2], self.gains.obstacle_margin)
+        return obstacle_term(in_camera, obstacles.evidence, depth, TOOL_IN_CAMERA[2], self.gains.obstacle_margin)
 
-    def _choose_way(self, percept: Percept, T_base_cam: FloatArray, blocked: bool) -> tuple[FloatArray, float]:
-        """Lateral direction that leads to the way that is best now, and the angle to it, rad."""
-        gains, target = self.gains, percept.fixation.point_base
-        present = T_base_cam[:3, 3] - target
-        present /= np.linalg.norm(present)
-        if not self._avoid_obstacles or self._seen is None:
-            return np.zeros(2), 0.0
-        points, evidence = self._obstacle_points(percept)
-        self._ways = ways = known_ways(points, evidence, target, self._seen, 2.0 * gains.obstacle_margin)
-        near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
-        if blocked and near and self._way is not None and self._on_way_since < math.inf:
-            self._tried = np.vstack([self._tried, ways.directions[self._way]])
-            self._on_way_since = math.inf
-        cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs)
-        way = chosen_way(cost, self._way, gains.costs)
-        if way != self._way:
-            self._way, self._on_way_since = way, math.inf
-        direction, angle = lateral_direction(T_base_cam, present, ways.directions[way])
-        if angle < gains.on_way and self._on_way_since == math.inf:
-            self._on_way_since = percept.time
-        return direction, angle
-
-    def _is_close(self, percept: Percept, T_base_cam: FloatArray) -> bool:
+    def _is_close(self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles) -> bool:
         """Whether something is next to the hand, while it goes around; on its way in, the corridor says more."""
         if percept.fixation.distance_m < _INNER:
             return False
-        points, evidence = self._obstacle_points(percept)
-        beside = near_hand(transform(inverse(T_base_cam), points), self.gains.hand_room)
-        return bool(evidence[beside].sum() > 0.5 * self.gains.obstacle_evidence)
-
-    def _may_enter(self, time: float) -> bool:
-        """Whether the hand may go in on its way: it was looked at, or looking longer did not help."""
-        if not self._avoid_obstacles:
-            return True
-        if self._ways is None or self._way is None:
-            return False
-        seen = 1.0 - float(self._ways.unseen[self._way])
-        return seen > self.gains.seen_share or time - self._on_way_since > self.gains.look_seconds
+        beside = near_hand(transform(inverse(T_base_cam), obstacles.points), self.gains.hand_room)
+        return bool(obstacles.evidence[beside].sum() > 0.5 * self.gains.obstacle_evidence)
 
     # -- phases --------------------------------------------------------------------------------------------------
 
@@ -255,16 +204,18 @@ class ServoPolicy:
 
     # -- laws ----------------------------------------------------------------------------------------------------
 
-    def _twist(self, percept: Percept, T_base_cam: FloatArray, obstacle: ObstacleTerm) -> FloatArray:
+    def _twist(
+        self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles, obstacle: ObstacleTerm
+    ) -> FloatArray:
         if self._manoeuvre is not None:
             twist = open_loop.manoeuvre_twist(self._manoeuvre, T_base_cam, self.gains.open_loop)
         elif self._phase is Phase.SEARCH:
-            twist = self._searching_twist(percept, T_base_cam)
+            twist = self._searching_twist(percept, T_base_cam, obstacles)
         else:
-            twist = self._fixating_twist(percept, T_base_cam, obstacle)
+            twist = self._fixating_twist(percept, T_base_cam, obstacles, obstacle)
         return gaze.within_speed(twist)
 
-    def _searching_twist(self, percept: Percept, T_base_cam: FloatArray) -> FloatArray:
+    def _searching_twist(self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles) -> FloatArray:
         """Back off and go on around to the chosen way, gaze on the expected place. Then look around."""
         gains, fixation = self.gains, percept.fixation
         seconds = percept.time - self._phase_start
@@ -274,10 +225,10 @@ class ServoPolicy:
         if not fixation.initialised and support is not None:  # the target is somewhere on the table
             distance = (T_base_cam[2, 3] - support) / max(math.sin(gaze.elevation(T_base_cam)), 0.1)
         lateral = np.zeros(2)
-        if self._way is None:
+        if not self._search.has_way:
             lateral = np.array([0.0, -gains.search_climb])
         elif fixation.initialised:
-            direction, angle = self._choose_way(percept, T_base_cam, blocked=False)
+            direction, angle = self._search.choose(percept, T_base_cam, obstacles, blocked=False)
             lateral = direction * min(gains.turn_gain * distance * angle, gains.turn_speed)
         if fixation.initialised:
             lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
@@ -286,34 +237,28 @@ class ServoPolicy:
         level = gaze.levelling(T_base_cam, gains.gaze)
         return gaze.fixating_twist(np.array([*lateral, back]), expected, fixation.distance_m, level, gains.gaze)
 
-    def _fixating_twist(self, percept: Percept, T_base_cam: FloatArray, obstacle: ObstacleTerm) -> FloatArray:
+    def _fixating_twist(
+        self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles, obstacle: ObstacleTerm
+    ) -> FloatArray:
         """Eqs. 6-8 together."""
         gains, fixation = self.gains, percept.fixation
         certainty = min(1.0, obstacle.evidence / gains.obstacle_evidence)
         direction, angle = np.zeros(2), 0.0
-        if self._phase is Phase.APPROACH:
-            direction, angle = self._choose_way(percept, T_base_cam, certainty == 1.0)
+        if self._avoid_obstacles and self._phase is Phase.APPROACH:
+            direction, angle = self._search.choose(percept, T_base_cam, obstacles, certainty == 1.0)
         speed = min(gains.turn_gain * fixation.distance_m * angle, gains.turn_speed)
         if angle > gains.on_way:  # farther in, the hand must not swing into what stands beside its way
             far = 1.0 - (gains.orbit_distance - fixation.distance_m) / _BACKING_OFF
             speed *= min(1.0, max(0.05, far))
-        close = self._is_close(percept, T_base_cam)
+        close = self._is_close(percept, T_base_cam, obstacles)
         if close:
             speed *= 0.3
-        lateral = servo_laws.lateral_velocity(
-            fixation.distance_m,
-            gains.desired_distance,
-            np.zeros(2),
-            percept.time,
-            gains.cycle_amplitude,
-            gains.cycle_rate,
-            -speed,
-            direction,
-        )
+        cycle = servo_laws.cyclic_velocity(percept.time, gains.cycle_amplitude, gains.cycle_rate)
+        lateral = cycle + speed * direction
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
         forward = self._forward_speed(percept, obstacle, certainty, angle)
         v = np.array([*lateral, -gains.retreat_speed if close else forward])
-        roll_error = self._roll_error(percept, T_base_cam, certainty)
+        roll_error = self._roll_error(percept, T_base_cam, obstacles, certainty)
         return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, gains.gaze)
 
     def _forward_speed(self, percept: Percept, obstacle: ObstacleTerm, certainty: float, angle: float) -> float:
@@ -323,12 +268,12 @@ class ServoPolicy:
             return -gains.retreat_speed
         if self._phase is not Phase.APPROACH or angle > gains.on_way or certainty == 1.0:
             return -gains.retreat_speed if distance < gains.orbit_distance else 0.0
-        if not self._may_enter(percept.time):
+        if self._avoid_obstacles and not self._search.may_enter(percept.time):
             return 0.0
         wanted = servo_laws.approach_speed(distance, gains.desired_distance, gains.approach_gain)
         return min(wanted, gains.approach_speed) * (1.0 - certainty)
 
-    def _roll_error(self, percept: Percept, T_base_cam: FloatArray, certainty: float) -> float:
+    def _roll_error(self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles, certainty: float) -> float:
         """Angle to turn about the optical axis, rad: level from afar, or if that frees the way of the hand.
 
         Otherwise across the target's narrow axis.
@@ -338,6 +283,6 @@ class ServoPolicy:
         if not near or certainty == 1.0:
             return gaze.levelling(T_base_cam, gains)
         turn = narrow_axis(percept.segmentation.mask, roll, gains.max_roll)
-        turned = self._obstacle_term(percept, T_base_cam @ exp_twist(_ROLL, turn))
+        turned = self._obstacle_term(percept, T_base_cam @ exp_twist(_ROLL, turn), obstacles)
         blocked = turned.evidence > self.gains.obstacle_evidence
         return gaze.levelling(T_base_cam, gains) if blocked else turn

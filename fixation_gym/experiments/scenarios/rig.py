@@ -14,7 +14,7 @@ from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE, SensorNoise
 from fixation_gym.envs.pick_sim import PickSim
 from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
-from fixation_gym.envs.scene_mjcf import CAMERA_NAME, HIDDEN_GROUP, MIRROR_MATERIAL, obstacle_part_name
+from fixation_gym.envs.scene_mjcf import CAMERA_NAME, HIDDEN_GROUP, obstacle_part_name
 from fixation_gym.envs.truth_view import Truth, TruthView
 from fixation_gym.experiments.scenarios.scenes import Instance, sample_instance
 from fixation_gym.geometry.camera import Intrinsics
@@ -50,15 +50,6 @@ class Look:
     """True depth of the target's centre, m."""
 
 
-class _SceneTruth(TruthView):
-    """The truth of whatever scene is loaded: which parts are mirrors is only known then."""
-
-    def look(self, qpos: FloatArray) -> Truth:
-        """Truth of a configuration."""
-        self._mirrors = np.flatnonzero(self._model.geom_matid == self._model.mat(MIRROR_MATERIAL).id)
-        return super().look(qpos)
-
-
 class ScenarioRig:
     """Simulation, wrist camera, sensors and perception. Owns GL contexts."""
 
@@ -68,7 +59,7 @@ class ScenarioRig:
         self.sim = PickSim(CONTROL_FREQUENCY)
         self._view = View(self.sim.model, CAMERA_NAME, *IMAGE_SIZE, full_quality=False)
         self.perception = Perception(INTRINSICS, support_height_m=TABLE_HEIGHT)
-        self._truth = _SceneTruth(self.sim.model, self.perception.flow_intrinsics)
+        self._truth = TruthView(self.sim.model, self.perception.flow_intrinsics)
         self.owners = tuple(self.sim.model.body(body).name for body in self.sim.model.geom_bodyid)
         """Name of the body of every geom."""
         names = [self.sim.model.geom(geom).name for geom in range(self.sim.model.ngeom)]

@@ -1,0 +1,98 @@
+"""Which way the hand takes, while the servo learns what stands around the target: the choice and its memory."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fixation_gym.control.ways import (
+    SeenSpace,
+    Ways,
+    chosen_way,
+    known_ways,
+    lateral_direction,
+    way_costs,
+)
+from fixation_gym.perception.obstacle_memory import seen_places
+from fixation_gym.perception.percept import Percept
+from fixation_gym.types import FloatArray
+from policies.servo.gains import ServoGains
+
+_HIDING = 0.06
+"""A thing hides what is behind it if it is nearer by this share."""
+
+
+class Obstacles(NamedTuple):
+    """Points of obstacles that are believed in one control step."""
+
+    points: FloatArray
+    """Shape (n, 3), in base, m."""
+    evidence: FloatArray
+    """Of each point, shape (n,)."""
+
+
+class WaySearch:
+    """Keeps what was looked at, the way that is taken, and those that were tried in vain."""
+
+    def __init__(self, gains: ServoGains) -> None:
+        """Start without knowledge."""
+        self._gains = gains
+        self._seen: SeenSpace | None = None
+        self._ways: Ways | None = None
+        self._way: int | None = None
+        self._arrived = math.inf
+        self._tried = np.zeros((0, 3))
+
+    @property
+    def has_way(self) -> bool:
+        """Whether a way was chosen."""
+        return self._way is not None
+
+    def look(self, percept: Percept) -> None:
+        """Note which places around the target are in view."""
+        target = percept.fixation.point_base
+        if self._seen is None:
+            self._seen = SeenSpace.empty(math.atan2(target[1], target[0]))
+        places = self._seen.places(target)
+        self._seen = self._seen.with_seen(
+            seen_places(places, percept.zfc, percept.flow.intrinsics, percept.T_base_cam, _HIDING)
+        )
+
+    def choose(
+        self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles, blocked: bool
+    ) -> tuple[FloatArray, float]:
+        """Lateral direction, shape (2,), in ``cam``, that leads to the way that is best now, and the angle to it, rad.
+
+        Args:
+            percept: of this control step.
+            T_base_cam: camera pose, shape (4, 4).
+            obstacles: what is believed to stand there.
+            blocked: whether something is surely in the corridor along the present line of sight.
+        """
+        gains, target = self._gains, percept.fixation.point_base
+        if self._seen is None:
+            return np.zeros(2), 0.0
+        present = T_base_cam[:3, 3] - target
+        present /= np.linalg.norm(present)
+        self._ways = ways = known_ways(*obstacles, target, self._seen, 2.0 * gains.obstacle_margin)
+        near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
+        if blocked and near and self._way is not None and self._arrived < math.inf:
+            self._tried = np.vstack([self._tried, ways.directions[self._way]])
+            self._arrived = math.inf
+        cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs)
+        way = chosen_way(cost, self._way, gains.costs)
+        if way != self._way:
+            self._way, self._arrived = way, math.inf
+        direction, angle = lateral_direction(T_base_cam, present, ways.directions[way])
+        if angle < gains.on_way and self._arrived == math.inf:
+            self._arrived = percept.time
+        return direction, angle
+
+    def may_enter(self, time: float) -> bool:
+        """Whether the hand may go in on its way at ``time`` s: it was looked at, or looking longer did not help."""
+        if self._ways is None or self._way is None:
+            return False
+        seen = 1.0 - float(self._ways.unseen[self._way])
+        return seen > self._gains.seen_share or time - self._arrived > self._gains.look_seconds
