@@ -5,6 +5,7 @@ Used by the servo on what it has seen, by the scene sampler, so that every scene
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,6 +27,8 @@ _PARTS = np.array(
         [[-0.140, -0.130, -0.285], [0.075, 0.045, -0.152]],  # wrist
     ]
 )
+_SOLID = len(_PARTS) - 1
+"""Parts whose boxes they fill; the wrist's box holds it in whatever way the arm turns it, so most of it is empty."""
 _LAST_STRETCH = 0.12
 """Length of the open-loop motion, m; before it, the target is on the camera's axis and the tool below it."""
 
@@ -37,9 +40,9 @@ def near_hand(points: FloatArray, margin: float) -> MaskArray:
     return np.any(np.all(beyond < margin, axis=-1), axis=-1)
 
 
-def _swept_boxes() -> FloatArray:
-    """Boxes swept by every part: on the approach, below the camera's axis, and on the last stretch, shape (n, 2, 3)."""
-    last, approach = _PARTS.copy(), _PARTS.copy()
+def _swept_boxes(parts: FloatArray) -> FloatArray:
+    """Boxes swept by parts: on the approach, below the camera's axis, and on the last stretch, shape (n, 2, 3)."""
+    last, approach = parts.copy(), parts.copy()
     last[:, 0, 2] -= _LAST_STRETCH
     approach[:, :, 1] += TOOL_IN_CAMERA[1]
     approach[:, 1, 2] -= _LAST_STRETCH
@@ -48,7 +51,7 @@ def _swept_boxes() -> FloatArray:
 
 
 _SWEEP_LENGTH = 0.45
-_BOXES = _swept_boxes()
+_BOXES, _SOLID_BOXES = _swept_boxes(_PARTS), _swept_boxes(_PARTS[:_SOLID])
 
 
 def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
@@ -83,6 +86,23 @@ def free_directions(
     return np.asarray(~any_meets(target, hand_axes(directions, rolls), *boxes, *swept_hand(margin)))
 
 
+def barred_directions(target: FloatArray, obstacles: BoxSet, directions: FloatArray, depth: float) -> MaskArray:
+    """Tell for each direction whether a hand that comes straight in surely touches an obstacle.
+
+    Between free and barred are the ways on which it depends on the wrist's turn, or on millimetres.
+
+    Args:
+        target: point the finger tips go to, shape (3,), in base, m.
+        obstacles: boxes around the obstacles.
+        directions: unit vectors from target to camera, shape (n, 3), in base.
+        depth: by which the hand is taken to be smaller than it is, m.
+
+    Returns:
+        Mask of shape (n,).
+    """
+    return any_meets(target, hand_axes(directions), *obstacles, *_swept(_SOLID_BOXES, -depth))
+
+
 def hand_axes(directions: FloatArray, rolls: FloatArray | None = None) -> FloatArray:
     """Rows x, y, z of cameras that look against the directions, shape (n, 3, 3): level, or turned by ``rolls``, (n,).
 
@@ -112,7 +132,11 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
 
 def swept_hand(margin: float) -> tuple[FloatArray, FloatArray]:
     """Centres and half sizes of the swept boxes, widened by a margin; each of shape (n, 3), m."""
-    return 0.5 * (_BOXES[:, 0] + _BOXES[:, 1]), 0.5 * (_BOXES[:, 1] - _BOXES[:, 0]) + margin
+    return _swept(_BOXES, margin)
+
+
+def _swept(boxes: FloatArray, margin: float) -> tuple[FloatArray, FloatArray]:
+    return 0.5 * (boxes[:, 0] + boxes[:, 1]), 0.5 * (boxes[:, 1] - boxes[:, 0]) + margin
 
 
 def level_axes(directions: FloatArray) -> FloatArray:
@@ -141,6 +165,37 @@ def _any_holds(points: FloatArray, centres: FloatArray, halves: FloatArray) -> M
 
 
 @njit(cache=True)
+def _length(vector: FloatArray) -> float:
+    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+
+
+@njit(cache=True)
+def _turn(axes: FloatArray, place: FloatArray, origin: FloatArray, out: FloatArray) -> None:
+    """A place in the frame at ``origin`` whose axes are the rows of ``axes``."""
+    for k in range(3):
+        out[k] = 0.0
+        for axis in range(3):
+            out[k] += axes[k, axis] * (place[axis] - origin[axis])
+
+
+@njit(cache=True)
+def _multiply(first: FloatArray, second: FloatArray, out: FloatArray) -> None:
+    for k in range(3):
+        for axis in range(3):
+            out[k, axis] = 0.0
+            for m in range(3):
+                out[k, axis] += first[k, m] * second[m, axis]
+
+
+@njit(cache=True)
+def _is_outside(place: FloatArray, low: FloatArray, high: FloatArray, margin: float) -> bool:
+    outside = False
+    for k in range(3):
+        outside |= place[k] < low[k] - margin or place[k] > high[k] + margin
+    return outside
+
+
+@njit(cache=True)
 def any_meets(
     target: FloatArray,
     axes: FloatArray,
@@ -152,12 +207,19 @@ def any_meets(
 ) -> MaskArray:
     """For each of n cameras, axes (n, 3, 3), whether one of m turned boxes meets one of the aligned ones."""
     hit = np.zeros(len(axes), np.bool_)
+    low, high = centres[0] - halves[0], centres[0] + halves[0]
+    for box in range(1, len(centres)):
+        low, high = np.minimum(low, centres[box] - halves[box]), np.maximum(high, centres[box] + halves[box])
+    offset, rotation = np.empty(3), np.empty((3, 3))
     for camera in range(len(axes)):
         for i in range(len(places)):
-            offset = axes[camera] @ (places[i] - target)
-            rotation = axes[camera] @ turns[i]
+            radius = _length(turned_halves[i])
+            _turn(axes[camera], places[i], target, offset)
+            if _is_outside(offset, low, high, radius):  # of the box around all aligned ones, as most are
+                continue
+            _multiply(axes[camera], turns[i], rotation)
             for box in range(len(centres)):
-                if _boxes_meet(offset - centres[box], rotation, turned_halves[i], halves[box]):
+                if _boxes_meet(offset, centres[box], rotation, turned_halves[i], halves[box]):
                     hit[camera] = True
                     break
             if hit[camera]:
@@ -166,21 +228,35 @@ def any_meets(
 
 
 @njit(cache=True)
-def _boxes_meet(offset: FloatArray, rotation: FloatArray, turned: FloatArray, half: FloatArray) -> bool:
-    """Whether a box turned by ``rotation`` at ``offset`` meets an aligned one at 0 (separating axes, Gottschalk)."""
-    size = np.abs(rotation) + 1e-9  # parallel edges have no cross product
+def _boxes_meet(
+    offset: FloatArray, centre: FloatArray, rotation: FloatArray, turned: FloatArray, half: FloatArray
+) -> bool:
+    """Whether a box turned by ``rotation`` at ``offset`` meets an aligned one (separating axes, Gottschalk).
+
+    Without temporary arrays, since sampling a scene asks for it a million times.
+    """
+    d = (offset[0] - centre[0], offset[1] - centre[1], offset[2] - centre[2])
     for i in range(3):
-        if abs(offset[i]) > half[i] + size[i, 0] * turned[0] + size[i, 1] * turned[1] + size[i, 2] * turned[2]:
+        reach = half[i]
+        for k in range(3):
+            reach += abs(rotation[i, k]) * turned[k]
+        if abs(d[i]) > reach:
             return False
-        along = offset[0] * rotation[0, i] + offset[1] * rotation[1, i] + offset[2] * rotation[2, i]
-        if abs(along) > turned[i] + size[0, i] * half[0] + size[1, i] * half[1] + size[2, i] * half[2]:
+    for i in range(3):
+        along, reach = 0.0, turned[i]
+        for k in range(3):
+            along += d[k] * rotation[k, i]
+            reach += abs(rotation[k, i]) * half[k]
+        if abs(along) > reach:
             return False
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         for j in range(3):
-            c, d = (j + 1) % 3, (j + 2) % 3
-            reach = half[a] * size[b, j] + half[b] * size[a, j] + turned[c] * size[i, d] + turned[d] * size[i, c]
-            if abs(offset[b] * rotation[a, j] - offset[a] * rotation[b, j]) > reach:
+            k, m = (j + 1) % 3, (j + 2) % 3
+            reach = half[a] * abs(rotation[b, j]) + half[b] * abs(rotation[a, j])
+            reach += turned[k] * abs(rotation[i, m]) + turned[m] * abs(rotation[i, k])
+            # Parallel edges have no cross product: their axis is none, which the small number says.
+            if abs(d[b] * rotation[a, j] - d[a] * rotation[b, j]) > reach + 1e-9:
                 return False
     return True
 
@@ -202,16 +278,18 @@ def _meeting_pairs(
 ) -> MaskArray:
     """The compiled part of ``meeting_pairs``; ``owners`` are the sets of the boxes, shape (m,)."""
     meets = np.zeros((count, count), np.bool_)
-    reach = np.sqrt(np.sum(halves**2, axis=1)) + gap
+    reach, origin = np.sqrt(np.sum(halves**2, axis=1)) + gap, np.zeros(3)
+    offset, rotation = np.empty(3), np.empty((3, 3))
     for i in range(len(places)):
         for j in range(i):
             first, second = owners[i], owners[j]
             if first == second or meets[first, second]:
                 continue
-            apart = places[j] - places[i]
-            if np.sum(apart**2) > (reach[i] + reach[j]) ** 2:
+            _turn(turns[i].T, places[j], places[i], offset)
+            if _length(offset) > reach[i] + reach[j]:
                 continue
-            if _boxes_meet(turns[i].T @ apart, turns[i].T @ turns[j], halves[j], halves[i] + gap):
+            _multiply(turns[i].T, turns[j], rotation)
+            if _boxes_meet(offset, origin, rotation, halves[j], halves[i] + gap):
                 meets[first, second] = meets[second, first] = True
     return meets
 
@@ -234,14 +312,14 @@ def any_pair_meets(
     other_halves: FloatArray,
 ) -> bool:
     """Whether one of n turned boxes, (n, 3), (n, 3, 3), (n, 3), meets one of m others."""
+    origin, offset, rotation = np.zeros(3), np.empty(3), np.empty((3, 3))
     for i in range(len(places)):
-        reach = np.sqrt(np.sum(halves[i] ** 2))
+        reach = _length(halves[i])
         for j in range(len(others)):
-            apart = others[j] - places[i]
-            if np.sqrt(np.sum(apart**2)) > reach + np.sqrt(np.sum(other_halves[j] ** 2)):
+            _turn(turns[i].T, others[j], places[i], offset)
+            if _length(offset) > reach + _length(other_halves[j]):
                 continue
-            offset = turns[i].T @ apart
-            rotation = turns[i].T @ other_turns[j]
-            if _boxes_meet(offset, rotation, other_halves[j], halves[i]):
+            _multiply(turns[i].T, other_turns[j], rotation)
+            if _boxes_meet(offset, origin, rotation, other_halves[j], halves[i]):
                 return True
     return False

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fixation_gym.control.corridor import boxes_meet, free_directions, hand_boxes, meeting_pairs
+from fixation_gym.control.corridor import barred_directions, boxes_meet, hand_boxes, meeting_pairs
 from fixation_gym.control.reach import REACH_GRID
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.goal import Goal
 from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS
-from fixation_gym.envs.placement import OBSTACLE_GAP, draw_kind, draw_mover, draw_obstacle, moved_out
+from fixation_gym.envs.placement import OBSTACLE_GAP, Draft, draw_kind, draw_mover, draw_obstacle
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
 from fixation_gym.envs.visibility import is_seen, passes_through, visible_share
 from fixation_gym.geometry.boxes import BoxSet, box_set, joined
@@ -21,10 +21,12 @@ from fixation_gym.types import FloatArray, MaskArray
 
 _BARRED_DEPTH = 0.01
 """A way is barred if a hand smaller by this would still touch something, m."""
-_MOST_OPEN = 0.28
-"""Largest share of the reach that is not barred in the end."""
-_ABOVE = math.radians(75.0)
-"""Ways from above are those of at least this elevation, rad."""
+_MOST_OPEN = 0.33
+"""Largest share of the ways that is not barred in the end."""
+_MOST_AMONG = 0.40
+"""Largest share of the ways among which the free one is drawn that is not barred."""
+_ABOVE: MaskArray = REACH_GRID[:, 1] > math.radians(75.0)
+"""Which ways of the reach's grid come from above."""
 _MOST_ABOVE = 0.35
 """Largest share of them that is not barred, but for those near the free way."""
 _APART = math.radians(20.0)
@@ -69,10 +71,9 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An obstacle that has room, if no other were there, and what it bars."""
+    """What has room, if no other were there, and the ways that it bars."""
 
-    obstacle: ObstacleSpec
-    boxes: BoxSet
+    draft: Draft
     barred: MaskArray
     """Ways of the reach's grid that it bars."""
     first: bool
@@ -88,23 +89,26 @@ class Pool:
     """Ways that each of them bars, shape (n, ways)."""
     clashes: MaskArray
     """Which of them have no room beside each other, shape (n, n)."""
+    first: MaskArray
+    """Which of them were drawn as first ones, shape (n,)."""
 
     @classmethod
     def of(cls, candidates: list[Candidate]) -> Pool:
         """The pool of these candidates."""
         barred = np.array([candidate.barred for candidate in candidates])
-        clashes = meeting_pairs([candidate.boxes for candidate in candidates], OBSTACLE_GAP)
-        mirrors = np.array([candidate.obstacle.kind == "mirror" for candidate in candidates])
-        return cls(candidates, barred, clashes | np.outer(mirrors, mirrors))  # MuJoCo draws one reflection only
+        clashes = meeting_pairs([candidate.draft.boxes for candidate in candidates], OBSTACLE_GAP)
+        mirrors = np.array([candidate.draft.material == "mirror" for candidate in candidates])
+        clashes |= np.outer(mirrors, mirrors)  # MuJoCo draws one reflection only
+        return cls(candidates, barred, clashes, np.array([candidate.first for candidate in candidates]))
 
 
 def draw_candidates(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> list[Candidate]:
-    """Obstacles that leave the free way, each as if it were alone."""
-    drawn = [
-        _draw_candidate(scenario, goal, index < _FIRST_CANDIDATES, goal.ways[rng.integers(len(goal.ways))], rng)
-        for index in range(_FIRST_CANDIDATES + _CANDIDATES)
-    ]
-    return [candidate for candidate in drawn if candidate is not None]
+    """Obstacles that leave the free way, each as if it were alone; none if there is none to begin with."""
+    first = [_draw_candidate(scenario, goal, True, _way(goal, rng), rng) for _ in range(_FIRST_CANDIDATES)]
+    if not any(first):
+        return []
+    others = [_draw_candidate(scenario, goal, False, _way(goal, rng), rng) for _ in range(_CANDIDATES)]
+    return [candidate for candidate in first + others if candidate is not None]
 
 
 def draw_across(scenario: Scenario, goal: Goal, view: View, rng: np.random.Generator) -> list[Candidate]:
@@ -112,26 +116,29 @@ def draw_across(scenario: Scenario, goal: Goal, view: View, rng: np.random.Gener
     sight = goal.ways[view.first_sight]
     drawn = [_draw_candidate(scenario, goal, True, sight, rng) for _ in range(_FIRST_CANDIDATES)]
     through = (item for item in drawn if item is not None)
-    return [item for item in through if passes_through(item.obstacle.box, view.camera, goal.room.ends[0])]
+    return [item for item in through if passes_through(item.draft.box, view.camera, goal.room.ends[0])]
 
 
-def bar_ways(scenario: Scenario, goal: Goal, view: View, pool: Pool) -> list[ObstacleSpec] | None:
+def bar_ways(
+    scenario: Scenario, goal: Goal, view: View, pool: Pool, rng: np.random.Generator
+) -> list[ObstacleSpec] | None:
     """Obstacles out of the pool that bar all ways but those near the free one; None if there are none.
 
     Those that bar most are taken, if they have room beside the others and do not hide the target.
     """
     hand = joined([hand_boxes(view.pose), *view.taken])
-    usable = np.array([not boxes_meet(item.boxes, hand, _START_ROOM) for item in pool.candidates])
-    for first, item in enumerate(pool.candidates):
-        if not (item.first and usable[first]):
+    usable = np.array([not boxes_meet(item.draft.boxes, hand, _START_ROOM) for item in pool.candidates])
+    open_ways = ~np.logical_or.reduce(pool.barred[usable], axis=0)
+    if not _is_barred(goal, view, open_ways):
+        return None
+    for first in np.flatnonzero(pool.first & usable):
+        draft = pool.candidates[first].draft
+        if scenario.through_sight and not passes_through(draft.box, view.camera, goal.room.ends[0]):
             continue
-        if scenario.through_sight and not passes_through(item.obstacle.box, view.camera, goal.room.ends[0]):
+        chosen = [pool.candidates[index] for index in _covering(scenario, goal, view, pool, int(first), usable)]
+        obstacles = [item.draft.finished(scenario, rng) for item in chosen]
+        if not chosen or (scenario.discovery and not _is_discovered(goal, view, chosen, obstacles)):
             continue
-        indices = _covering(scenario, goal, view, pool, first, usable)
-        chosen = [pool.candidates[index] for index in indices]
-        if not chosen or (scenario.discovery and not _is_discovered(goal, view, chosen)):
-            continue
-        obstacles = [item.obstacle for item in chosen]
         if visible_share(view.camera, goal.target, obstacles) >= _LEAST_VISIBLE:
             return obstacles
     return None
@@ -164,8 +171,8 @@ def _covering(scenario: Scenario, goal: Goal, view: View, pool: Pool, first: int
     """Indices of ``first`` and of those others that bar enough with it; none if they do not."""
     least, most = scenario.obstacle_count
     chosen, open_ways = [first], ~pool.barred[first]
-    left = usable & ~pool.clashes[first] & [not candidate.first for candidate in pool.candidates]
-    while len(chosen) < least or not _is_barred(open_ways, goal.near_free, view.first_sight):
+    left = usable & ~pool.clashes[first] & ~pool.first
+    while len(chosen) < least or not _is_barred(goal, view, open_ways):
         gains = np.where(left, (pool.barred & open_ways).sum(axis=1), -1)
         best = int(np.argmax(gains))
         if len(chosen) == most or gains[best] < 0 or (gains[best] == 0 and len(chosen) >= least):
@@ -177,22 +184,29 @@ def _covering(scenario: Scenario, goal: Goal, view: View, pool: Pool, first: int
     return chosen
 
 
-def _is_barred(open_ways: MaskArray, near_free: MaskArray, first_sight: int) -> bool:
-    """Whether the first line of sight and enough of all other ways are barred, those from above in particular."""
-    above = (REACH_GRID[:, 1] > _ABOVE) & ~near_free
+def _is_barred(goal: Goal, view: View, open_ways: MaskArray) -> bool:
+    """Whether the first line of sight and enough of all other ways are barred.
+
+    Also of those from above, and of those among which the free one is drawn: a shelf leaves only low ways, and a hand
+    that always comes in low must not find most of them open.
+    """
+    above = _ABOVE & ~goal.near_free
     return bool(
-        not open_ways[first_sight]
+        not open_ways[view.first_sight]
         and open_ways.mean() <= _MOST_OPEN
+        and open_ways[goal.drawn_among].mean() <= _MOST_AMONG
         and (not above.any() or open_ways[above].mean() <= _MOST_ABOVE)
     )
 
 
-def _is_discovered(goal: Goal, view: View, chosen: list[Candidate]) -> bool:
+def _is_discovered(goal: Goal, view: View, chosen: list[Candidate], obstacles: list[ObstacleSpec]) -> bool:
     """Whether the nearest way that the first obstacle leaves is barred by something out of view at the start."""
     nearness = np.where(chosen[0].barred | goal.near_free, -1.0, goal.ways @ goal.ways[view.first_sight])
     natural = int(np.argmax(nearness))
-    first = [chosen[0].obstacle]
-    return any(item.barred[natural] and not is_seen(item.obstacle, view.pose, first) for item in chosen[1:])
+    return any(
+        item.barred[natural] and not is_seen(obstacle, view.pose, obstacles[:1])
+        for item, obstacle in zip(chosen[1:], obstacles[1:], strict=True)
+    )
 
 
 def _draw_candidate(
@@ -206,16 +220,19 @@ def _draw_candidate(
     kind, material = drawn
     bearing = goal.free.azimuth if kind.around else math.atan2(-beyond[1], -beyond[0]) + rng.normal(0.0, 0.2)
     nearest, farthest = kind.distance
-    obstacle = draw_obstacle(kind, material, goal.room.ends[-1], bearing, nearest, scenario, rng)
+    draft = draw_obstacle(kind, material, goal.room.ends[-1], bearing, nearest, rng)
     outward = bearing + math.pi if kind.around else bearing  # what stands around the target draws back from the way
-    boxes = obstacle.boxes
-    step = -_STEP_OUT * np.array([math.cos(outward), math.sin(outward), 0.0])
-    steps = goal.room.first_place(boxes, step, int((farthest - nearest) / _STEP_OUT))
+    step = np.array([-_STEP_OUT * math.cos(outward), -_STEP_OUT * math.sin(outward), 0.0])
+    steps = goal.room.first_place(draft.boxes, step, int((farthest - nearest) / _STEP_OUT))
     if steps is None:
         return None
-    boxes, obstacle = boxes.moved(steps * step), moved_out(obstacle, outward, steps * _STEP_OUT)
-    barred = ~free_directions(goal.room.ends[-1], boxes, goal.ways, -_BARRED_DEPTH)
-    return Candidate(obstacle, boxes, barred, first)
+    draft = draft.moved(steps * step)
+    return Candidate(draft, barred_directions(goal.room.ends[-1], draft.boxes, goal.ways, _BARRED_DEPTH), first)
+
+
+def _way(goal: Goal, rng: np.random.Generator) -> FloatArray:
+    """A way to be barred; half of them come from above, which is the harder to bar."""
+    return goal.ways[rng.choice(np.flatnonzero(_ABOVE)) if rng.random() < 0.5 else rng.integers(len(goal.ways))]
 
 
 def _beyond(free: FloatArray, way: FloatArray, angle: float) -> FloatArray:
@@ -223,9 +240,9 @@ def _beyond(free: FloatArray, way: FloatArray, angle: float) -> FloatArray:
 
     What stands there bars the way without being in the free one: the hand is wide.
     """
-    across = way - (way @ free) * free
-    across /= max(float(np.linalg.norm(across)), 1e-9)
-    total = math.acos(float(np.clip(way @ free, -1.0, 1.0))) + angle
-    direction = math.cos(total) * free + math.sin(total) * across
+    along = float(way @ free)
+    across = way - along * free
+    total = math.acos(min(max(along, -1.0), 1.0)) + angle
+    direction = math.cos(total) * free + math.sin(total) / max(math.hypot(*across), 1e-9) * across
     direction[2] = max(direction[2], 0.05)
-    return direction / np.linalg.norm(direction)
+    return direction / math.hypot(*direction)

@@ -180,7 +180,7 @@ SCENARIOS: dict[str, Scenario] = {
             ("opaque", "translucent", "wire"),
             first_kinds=("cabinet", "shelf", "roof"),
             obstacle_count=(2, 6),
-            free_elevation_deg=(40.0, 58.0),
+            free_elevation_deg=(40.0, 65.0),
         ),
         Scenario(
             "bin",

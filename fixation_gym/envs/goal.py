@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fixation_gym.control.corridor import approach_directions, hand_axes
-from fixation_gym.control.reach import reachable_directions
+from fixation_gym.control.corridor import hand_axes
+from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.placement import Room, sample_push
@@ -40,7 +40,8 @@ class Way:
     @property
     def direction(self) -> FloatArray:
         """Unit vector from the target to a camera on that way, shape (3,), in base."""
-        return approach_directions(np.array([self.azimuth]), np.array([self.elevation]))[0]
+        flat = -math.cos(self.elevation)
+        return np.array([flat * math.cos(self.azimuth), flat * math.sin(self.azimuth), math.sin(self.elevation)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,8 @@ class Goal:
     """Directions from the target, in the end, to cameras all over the reach, shape (n, 3)."""
     near_free: MaskArray
     """Those near the free way, shape (n,)."""
+    drawn_among: MaskArray
+    """Those from which the free way is drawn, shape (n,)."""
 
 
 def sample_goal(scenario: Scenario, free_angles: tuple[float, float], rng: np.random.Generator) -> Goal:
@@ -65,7 +68,15 @@ def sample_goal(scenario: Scenario, free_angles: tuple[float, float], rng: np.ra
     target = replace(target, yaw=_grasped_yaw(target, free, rng))
     room = _room(target, free)
     ways = reachable_directions(room.ends[-1])
-    return Goal(target, free, room, ways, ways @ free.direction > math.cos(_NEAR_FREE))
+    near_free = ways @ free.direction > math.cos(_NEAR_FREE)
+    return Goal(target, free, room, ways, near_free, _elevations_within(scenario.free_elevation_deg))
+
+
+def _elevations_within(bounds_deg: tuple[float, float]) -> MaskArray:
+    """Which ways of the reach's grid are of an elevation within these bounds, or nearest to it."""
+    low, high = np.radians(bounds_deg)
+    beyond = np.maximum(np.maximum(low - REACH_GRID[:, 1], REACH_GRID[:, 1] - high), 0.0)
+    return beyond <= beyond.min() + 1e-6
 
 
 def sample_target(scenario: Scenario, rng: np.random.Generator) -> TargetSpec:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fixation_gym.envs.shapes import Part, Shape, cage, pane, ring
 
-SLOTS = (26, 14, 14, 14, 12, 12, 10, 10, 10)
+SLOTS = (30, 14, 14, 14, 12, 12, 10, 10, 10)
 """Numbers of parts of the bodies that obstacles can take, the largest first."""
 MAX_OBSTACLES = len(SLOTS)
 

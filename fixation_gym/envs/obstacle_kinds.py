@@ -142,11 +142,13 @@ def _niche(material: str, rng: np.random.Generator) -> Parts:
 
 def _bin(material: str, rng: np.random.Generator) -> Parts:
     """Four low walls, and a lid over the side that is turned away."""
-    half_x, half_y, top = rng.uniform(0.10, 0.14), rng.uniform(0.10, 0.14), rng.uniform(0.06, 0.12)
-    second = _second(material)
-    back = pane(material, half_y, 0.5 * top + 0.03, (-half_x, 0.0, 0.5 * top + 0.03))
+    half_x, half_y, top = rng.uniform(0.10, 0.13), rng.uniform(0.13, 0.16), rng.uniform(0.06, 0.11)
+    second, lid_height, lid_edge = _second(material), top + rng.uniform(0.05, 0.10), -rng.uniform(0.03, 0.08)
+    back = pane(material, half_y, 0.5 * lid_height, (-half_x, 0.0, 0.5 * lid_height))
     front = pane(second, half_y, 0.5 * top, (half_x, 0.0, 0.5 * top))
-    return (*back, *front, *_sides(second, half_x, half_y, top, 0.0))
+    half_depth = 0.5 * (lid_edge + half_x)
+    lid = pane(second, half_y, half_depth, (half_depth - half_x, 0.0, lid_height), -math.pi / 2)
+    return (*back, *front, *_sides(second, half_x, half_y, top, 0.0), *lid)
 
 
 # -- pieces ------------------------------------------------------------------------------------------------------------
@@ -204,6 +206,6 @@ OBSTACLE_KINDS: tuple[ObstacleKind, ...] = (
     ObstacleKind("shelf", (0.04, 0.28), (0.5, 1.0), _shelf),
     ObstacleKind("cabinet", (0.0, 0.12), (0.0, 1.0), _cabinet, around=True),
     ObstacleKind("niche", (0.0, 0.10), (0.0, 1.0), _niche, around=True),
-    ObstacleKind("bin", (0.0, 0.03), (0.0, 1.0), _bin, around=True),
+    ObstacleKind("bin", (0.0, 0.08), (0.0, 1.0), _bin, around=True),
 )
 KIND_NAMES = tuple(kind.name for kind in OBSTACLE_KINDS)

@@ -13,8 +13,8 @@ from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.obstacle_kinds import ObstacleKind, kinds_of
 from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
-from fixation_gym.envs.shapes import centred
-from fixation_gym.geometry.boxes import BoxSet
+from fixation_gym.envs.shapes import Part, Shape, Vector, centred, placed_boxes
+from fixation_gym.geometry.boxes import Box, BoxSet
 from fixation_gym.types import FloatArray
 
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
@@ -50,22 +50,64 @@ def draw_kind(
         rng: generator.
     """
     materials = scenario.obstacle_materials
-    material = materials[0] if first else str(rng.choice(materials))
+    material = materials[0 if first else int(rng.integers(len(materials)))]
     names = (scenario.first_kinds if first else ()) or scenario.obstacle_kinds
     kinds = [kind for kind in kinds_of(material) if kind.name in names and (first or not kind.around)]
     suitable = [kind for kind in kinds if kind.around or kind.steepness[0] <= steepness <= kind.steepness[1]]
     return (suitable[int(rng.integers(len(suitable)))], material) if suitable else None
 
 
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """An obstacle that may come into the scene: what it is made of and where it stands, but not yet how it looks."""
+
+    kind: ObstacleKind
+    material: str
+    parts: tuple[Part, ...]
+    """In the floor frame of its kind."""
+    origin: Vector
+    """Of that frame in base, m."""
+    facing: float
+    """Of that frame about the vertical, rad."""
+    boxes: BoxSet
+    """Around its parts, in base."""
+
+    def moved(self, offset: FloatArray) -> Draft:
+        """The same elsewhere; ``offset`` has shape (3,), m."""
+        x, y, z = (float(value) for value in np.add(self.origin, offset))
+        return replace(self, origin=(x, y, z), boxes=self.boxes.moved(offset))
+
+    @property
+    def box(self) -> Box:
+        """Box around all parts, in base."""
+        shape, position = self._centred()
+        return Box(np.array(position), np.array(shape.half_extent), self.facing)
+
+    def finished(self, scenario: Scenario, rng: np.random.Generator) -> ObstacleSpec:
+        """The obstacle, with its colour drawn."""
+        shape, position = self._centred()
+        volume = sum(part.density * 8.0 * math.prod(part.size) for part in self.parts)
+        tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
+        return ObstacleSpec(
+            kind=self.material,
+            shape=replace(shape, mass=min(max(_DENSITY * volume, _LEAST_MASS), _LARGEST_MASS)),
+            position=position,
+            yaw=self.facing,
+            rgba=(float(tint[0]), float(tint[1]), float(tint[2]), float(rng.uniform(*scenario.alpha))),
+            texture=str(rng.choice(OBSTACLE_TEXTURES)),
+        )
+
+    def _centred(self) -> tuple[Shape, Vector]:
+        """The shape, and where its centre is in base."""
+        shape, (x, y, _) = centred(self.kind.name, self.parts, 1.0)
+        c, s = math.cos(self.facing), math.sin(self.facing)
+        height = TABLE_HEIGHT + shape.half_extent[2]
+        return shape, (self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y, height)
+
+
 def draw_obstacle(
-    kind: ObstacleKind,
-    material: str,
-    target: FloatArray,
-    bearing: float,
-    distance: float,
-    scenario: Scenario,
-    rng: np.random.Generator,
-) -> ObstacleSpec:
+    kind: ObstacleKind, material: str, target: FloatArray, bearing: float, distance: float, rng: np.random.Generator
+) -> Draft:
     """Draw an obstacle.
 
     Args:
@@ -75,32 +117,12 @@ def draw_obstacle(
         bearing: azimuth of a way of the hand, in base, rad: the obstacle stands below it or, if it stands around the
             target, opens towards it.
         distance: between its place and the target, horizontal, m.
-        scenario: with the range of the opacity.
         rng: generator.
     """
-    anchor = target[:2] - distance * np.array([math.cos(bearing), math.sin(bearing)])
+    x, y = float(target[0]) - distance * math.cos(bearing), float(target[1]) - distance * math.sin(bearing)
     facing = bearing + rng.uniform(-0.4, 0.4) + (math.pi if kind.around else 0.0)
-    parts = kind.draw(material, rng)
-    shape, origin = centred(kind.name, parts, 1.0)
-    volume = sum(part.density * 8.0 * math.prod(part.size) for part in parts)
-    shape = replace(shape, mass=min(max(_DENSITY * volume, _LEAST_MASS), _LARGEST_MASS))
-    c, s = math.cos(facing), math.sin(facing)
-    x, y = anchor[0] + c * origin[0] - s * origin[1], anchor[1] + s * origin[0] + c * origin[1]
-    tint = rng.uniform(0.55, 0.95, 3) * [0.75, 1.0, 1.0]
-    return ObstacleSpec(
-        kind=material,
-        shape=shape,
-        position=(float(x), float(y), TABLE_HEIGHT + shape.half_extent[2]),
-        yaw=float(facing),
-        rgba=(float(tint[0]), float(tint[1]), float(tint[2]), float(rng.uniform(*scenario.alpha))),
-        texture=str(rng.choice(OBSTACLE_TEXTURES)),
-    )
-
-
-def moved_out(obstacle: ObstacleSpec, bearing: float, distance: float) -> ObstacleSpec:
-    """The obstacle farther out by ``distance`` m on the side from which a way with that azimuth comes."""
-    x, y, z = obstacle.position
-    return replace(obstacle, position=(x - distance * math.cos(bearing), y - distance * math.sin(bearing), z))
+    parts, origin = kind.draw(material, rng), (x, y, TABLE_HEIGHT)
+    return Draft(kind, material, parts, origin, facing, placed_boxes(parts, origin, facing))
 
 
 def draw_mover(
@@ -108,7 +130,8 @@ def draw_mover(
 ) -> ObstacleSpec:
     """Draw a thing that moves about somewhere near the target."""
     bearing = float(rng.uniform(-math.pi, math.pi))
-    still = draw_obstacle(kind, material, target, bearing, rng.uniform(*_MOVER_DISTANCE), scenario, rng)
+    draft = draw_obstacle(kind, material, target, bearing, rng.uniform(*_MOVER_DISTANCE), rng)
+    still = draft.finished(scenario, rng)
     heading = float(rng.uniform(-math.pi, math.pi))
     if str(rng.choice(scenario.obstacle_motions)) == "driven":
         length = rng.uniform(*_DRIVE_LENGTH)

@@ -35,7 +35,7 @@ _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
 _FRAME_HUES = (1.0 / 8.0, 7.0 / 8.0)
 """Range of the hue of coloured frames, 0..1: anything but the target's red."""
-_WAYS, _TARGETS, _VIEWS = 60, 10, 8
+_WAYS, _TARGETS, _VIEWS = 60, 25, 8
 """Free ways, targets for each, and first views for each of them that are tried."""
 
 
@@ -74,7 +74,7 @@ def _propose(scenario: Scenario, free: tuple[float, float], rng: np.random.Gener
             continue
         if scenario.through_sight:
             pool = Pool.of([*draw_across(scenario, goal, view, rng), *candidates])
-        barriers = bar_ways(scenario, goal, view, pool)
+        barriers = bar_ways(scenario, goal, view, pool, rng)
         placed = None if barriers is None else add_movers(scenario, goal, view, barriers, rng)
         if placed is not None and fits_pool(placed):
             return _scene(scenario, goal, view, tuple(placed), rng)

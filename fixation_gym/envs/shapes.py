@@ -54,11 +54,15 @@ class Shape:
 
     def boxes(self, position: Vector, yaw: float) -> BoxSet:
         """Boxes around all its parts for a shape at ``position``, turned by ``yaw`` about the vertical, in base."""
-        values = np.array([(*part.pos, *part.size, part.yaw + yaw, part.pitch) for part in self.parts])
-        c, s = math.cos(yaw), math.sin(yaw)
-        x, y, z = values[:, :3].T
-        centres = np.stack([c * x - s * y, s * x + c * y, z], axis=-1) + position
-        return BoxSet(centres, rotations(values[:, 6], values[:, 7]), values[:, 3:6])
+        return placed_boxes(self.parts, position, yaw)
+
+
+def placed_boxes(parts: tuple[Part, ...], origin: Vector, yaw: float) -> BoxSet:
+    """Boxes around parts whose frame is at ``origin`` in base, turned by ``yaw`` about the vertical."""
+    values = np.array([(*part.pos, *part.size, part.yaw + yaw, part.pitch) for part in parts])
+    c, s = math.cos(yaw), math.sin(yaw)
+    centres = values[:, :3] @ np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)]) + origin
+    return BoxSet(centres, rotations(values[:, 6], values[:, 7]), values[:, 3:6])
 
 
 def centred(name: str, parts: tuple[Part, ...], mass: float) -> tuple[Shape, Vector]:
@@ -73,7 +77,7 @@ def centred(name: str, parts: tuple[Part, ...], mass: float) -> tuple[Shape, Vec
 
 
 def _placed(part: Part, pos: Vector) -> Part:
-    """The part elsewhere; quicker than ``dataclasses.replace``, for scenes are drawn at every reset."""
+    """The part elsewhere; quicker than ``dataclasses.replace``."""
     return Part(part.primitive, part.size, pos, part.yaw, part.pitch, part.finish, part.density)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from fixation_gym.types import FloatArray
 
@@ -60,8 +61,13 @@ def joined(sets: Sequence[BoxSet]) -> BoxSet:
     return BoxSet(*(np.concatenate(arrays) for arrays in zip(*sets, strict=True)))
 
 
+@njit(cache=True)
 def rotations(yaws: FloatArray, pitches: FloatArray) -> FloatArray:
     """Rotations of yaw about z after pitch about y, both of shape (n,), rad; shape (n, 3, 3)."""
-    cy, sy, cp, sp = np.cos(yaws), np.sin(yaws), np.cos(pitches), np.sin(pitches)
-    rows = (cy * cp, -sy, cy * sp, sy * cp, cy, sy * sp, -sp, np.zeros_like(cp), cp)
-    return np.stack(rows, axis=-1).reshape(-1, 3, 3)
+    turns = np.zeros((len(yaws), 3, 3))
+    for i in range(len(yaws)):
+        cy, sy, cp, sp = np.cos(yaws[i]), np.sin(yaws[i]), np.cos(pitches[i]), np.sin(pitches[i])
+        turns[i, 0] = cy * cp, -sy, cy * sp
+        turns[i, 1] = sy * cp, cy, sy * sp
+        turns[i, 2] = -sp, 0.0, cp
+    return turns
