@@ -100,7 +100,7 @@ def barred_directions(target: FloatArray, obstacles: BoxSet, directions: FloatAr
     Returns:
         Mask of shape (n,).
     """
-    return any_meets(target, hand_axes(directions), *obstacles, *_swept(_SOLID_BOXES, -depth))
+    return any_meets(target, hand_axes(directions), *obstacles, *swept_hand(-depth, wrist=False))
 
 
 def hand_axes(directions: FloatArray, rolls: FloatArray | None = None) -> FloatArray:
@@ -130,12 +130,12 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
     return np.asarray(_any_holds(flat, *swept_hand(margin)).reshape(points.shape[:-1]))
 
 
-def swept_hand(margin: float) -> tuple[FloatArray, FloatArray]:
-    """Centres and half sizes of the swept boxes, widened by a margin; each of shape (n, 3), m."""
-    return _swept(_BOXES, margin)
+def swept_hand(margin: float, wrist: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Centres and half sizes of the boxes swept on a straight way, widened by a margin; each of shape (n, 3), m.
 
-
-def _swept(boxes: FloatArray, margin: float) -> tuple[FloatArray, FloatArray]:
+    Without the wrist they are of what the hand is sure to fill; the wrist's box holds it however the arm turns it.
+    """
+    boxes = _BOXES if wrist else _SOLID_BOXES
     return 0.5 * (boxes[:, 0] + boxes[:, 1]), 0.5 * (boxes[:, 1] - boxes[:, 0]) + margin
 
 
