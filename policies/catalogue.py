@@ -84,4 +84,4 @@ def make_policy(name: str, env: Any) -> Policy:
 
     variant = servo_variant(name)
     perception = Perception(env.unwrapped.intrinsics, variant.perception, support_height_m=TABLE_HEIGHT)
-    return ServoPolicy(perception, variant.gains, avoid_obstacles=variant.avoid_obstacles)
+    return ServoPolicy(perception, variant.gains, variant.memory, variant.avoid_obstacles)

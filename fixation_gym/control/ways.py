@@ -16,7 +16,7 @@ from fixation_gym.control.corridor import in_corridor, level_axes
 from fixation_gym.control.reach import REACH_GRID, azimuth_range, directions
 from fixation_gym.types import FloatArray, MaskArray
 
-_RADII = (0.08, 0.13, 0.18, 0.23, 0.28)
+_RADII = (0.08, 0.13, 0.18, 0.23, 0.28, 0.33)
 """Distances from the target of the places that are looked at, m."""
 _TRIED_WITHIN = math.cos(math.radians(14.0))
 """Cosine of the angle within which ways count as the one that was tried."""
@@ -29,7 +29,9 @@ class WayCosts:
     blocked: float = 0.9
     """Per natural logarithm of its evidence, where that is enough to be sure."""
     unseen: float = 0.8
-    """If nothing of its corridor was ever looked at."""
+    """If ``much_unseen`` of its corridor or more was never looked at."""
+    much_unseen: float = 0.2
+    """A thing that bars a way fills a small part of its corridor only."""
     tried: float = 0.7
     """Per time that it was tried in vain."""
     change: float = 0.12
@@ -91,14 +93,16 @@ def known_ways(points: FloatArray, weights: FloatArray, target: FloatArray, seen
         weights: evidence of each point, shape (n,).
         target: fixated point in base, shape (3,), m.
         seen: which places were looked at.
-        margin: room to keep around the hand, m.
+        margin: by which a hand is smaller and larger than it is, between which points count ever less, m.
     """
     ways = directions(REACH_GRID, target)
     evidence = np.zeros(len(ways))
     if len(points):
         axes = level_axes(ways)
         local = np.einsum("kij,nj->kni", axes, points - target)
-        evidence = (in_corridor(local, margin) & (local[..., 2] < 0.0)) @ weights
+        # What is remembered is a centimetre or two off: the deeper it is in a corridor the more it counts.
+        depth = sum(in_corridor(local, room).astype(np.float64) for room in (-margin, 0.0, margin)) / 3.0
+        evidence = (depth * (local[..., 2] < 0.0)) @ weights
     return Ways(ways, evidence, seen.unseen_shares)
 
 
@@ -115,7 +119,8 @@ def way_costs(ways: Ways, present: FloatArray, tried: FloatArray, full_weight: f
     turn = np.arccos(np.clip(ways.directions @ present, -1.0, 1.0))
     again = (ways.directions @ tried.T > _TRIED_WITHIN).sum(axis=1) if len(tried) else 0.0
     blocked = costs.blocked * np.log1p(ways.evidence / full_weight)
-    return turn + blocked + costs.unseen * ways.unseen + costs.tried * again + costs.strain * _AT_BORDER
+    unseen = costs.unseen * np.minimum(ways.unseen / costs.much_unseen, 1.0)
+    return turn + blocked + unseen + costs.tried * again + costs.strain * _AT_BORDER
 
 
 def chosen_way(cost: FloatArray, before: int | None, costs: WayCosts) -> int:
@@ -144,7 +149,7 @@ def lateral_direction(T_base_cam: FloatArray, present: FloatArray, way: FloatArr
 def _places() -> FloatArray:
     """Places around a target with bearing 0, shape (n, 3), m: along all ways of the reach, and a ring beyond it."""
     ways = directions(REACH_GRID, np.array([1.0, 0.0, 0.0]))
-    low = np.array([(azimuth, elevation) for elevation in (0.2, 0.45) for azimuth in np.linspace(-1.5, 3.2, 16)])
+    low = np.array([(azimuth, elevation) for elevation in (0.2, 0.35, 0.5) for azimuth in np.linspace(-1.5, 3.2, 32)])
     return np.concatenate([radius * np.vstack([ways, directions(low, np.array([1.0, 0.0, 0.0]))]) for radius in _RADII])
 
 

@@ -21,7 +21,7 @@ from fixation_gym.types import FloatArray, MaskArray
 
 _BARRED_DEPTH = 0.01
 """A way is barred if a hand smaller by this would still touch something, m."""
-_MOST_OPEN = 0.30
+_MOST_OPEN = 0.33
 """Largest share of the ways that is not barred in the end."""
 _MOST_AMONG = 0.40
 """Largest share of the ways among which the free one is drawn that is not barred."""
@@ -29,8 +29,6 @@ _ABOVE: MaskArray = REACH_GRID[:, 1] > math.radians(75.0)
 """Which ways of the reach's grid come from above."""
 _MOST_ABOVE = 0.35
 """Largest share of them that is not barred, but for those near the free way."""
-_LEAST_GAIN = 2
-"""Another obstacle comes in if it bars at least so many ways more of the reach's grid."""
 _APART = math.radians(20.0)
 """Least angle between the first line of sight and the free way: the hand is wide, and the former is to be barred."""
 _START_ROOM = 0.04
@@ -170,20 +168,20 @@ def add_movers(
 
 
 def _covering(scenario: Scenario, goal: Goal, view: View, pool: Pool, first: int, usable: MaskArray) -> list[int]:
-    """Indices of ``first`` and of those others that bar most with it; none if they do not bar enough."""
+    """Indices of ``first`` and of those others that bar enough with it; none if they do not."""
     least, most = scenario.obstacle_count
     chosen, open_ways = [first], ~pool.barred[first]
     left = usable & ~pool.clashes[first] & ~pool.first
-    while len(chosen) < most and left.any():
+    while len(chosen) < least or not _is_barred(goal, view, open_ways):
         gains = np.where(left, (pool.barred & open_ways).sum(axis=1), -1)
         best = int(np.argmax(gains))
-        if gains[best] < _LEAST_GAIN and len(chosen) >= least:
-            break
+        if len(chosen) == most or gains[best] < 0 or (gains[best] == 0 and len(chosen) >= least):
+            return []
         chosen.append(best)
         open_ways = open_ways & ~pool.barred[best]
         left &= ~pool.clashes[best]
         left[best] = False
-    return chosen if len(chosen) >= least and _is_barred(goal, view, open_ways) else []
+    return chosen
 
 
 def _is_barred(goal: Goal, view: View, open_ways: MaskArray) -> bool:

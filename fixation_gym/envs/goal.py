@@ -119,17 +119,19 @@ def _grasped_yaw(target: TargetSpec, free: Way, rng: np.random.Generator) -> flo
 
 
 def _room(target: TargetSpec, free: Way) -> Room:
-    """What obstacles must keep clear of: the target, the free way, also for a turned hand, and a cone around it."""
+    """What obstacles must keep clear of: the target and a cone of free ways, its axis also for a turned hand."""
     axis = free.direction
     across = np.cross(axis, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     angles = np.linspace(0.0, 2.0 * math.pi, 6, endpoint=False)[:, None]
     around = np.cos(angles) * across + np.sin(angles) * np.cross(axis, across)
     rim = math.cos(_CONE) * axis + math.sin(_CONE) * around
-    rolls = np.array([0.0, *_grasp_turns(target, free)])
+    turns = _grasp_turns(target, free)
+    ways = np.vstack([axis, rim, *[axis[None]] * len(turns)])
+    rolls = np.array([0.0] * (1 + len(rim)) + turns)
     ends = target.places[[0, -1]] if target.motion else target.places[:1]
     reds = box_set([replace(target.box, centre=place) for place in target.places])
-    return Room(reds, ends, hand_axes(np.repeat(axis[None], len(rolls), axis=0), rolls), hand_axes(rim))
+    return Room(reds, ends, hand_axes(ways, rolls))
 
 
 def _grasp_turns(target: TargetSpec, free: Way) -> list[float]:

@@ -36,7 +36,6 @@ _TARGET_GAP, OBSTACLE_GAP = 0.012, 0.006
 """Least room between an obstacle and red things, and between obstacles, m."""
 FREE_ROOM = 0.01
 """Room around the hand on the free ways, m."""
-_SWEPT, _SWEPT_SOLID = swept_hand(FREE_ROOM), swept_hand(FREE_ROOM, wrist=False)
 
 
 def draw_kind(
@@ -162,9 +161,7 @@ class Room:
     ends: FloatArray
     """Where the target is at first and in the end, shape (n, 3), in base, m."""
     ways: FloatArray
-    """Axes of the hand, as in ``corridor.hand_axes``, on the way to it that stays free, shape (m, 3, 3)."""
-    cone: FloatArray
-    """The same around that way, shape (k, 3, 3): free but for the box that holds the wrist however it is turned."""
+    """Axes of the hand, as in ``corridor.hand_axes``, on the ways to it that stay free, shape (m, 3, 3)."""
 
     def first_place(self, boxes: BoxSet, step: FloatArray, most: int) -> int | None:
         """Number of steps after which an obstacle has room; None if it never has.
@@ -174,8 +171,8 @@ class Room:
             step: by which it is moved, shape (3,), m.
             most: largest number of steps.
         """
-        hands = (self.ways, *_SWEPT), (self.cone, *_SWEPT_SOLID)
-        steps = _first_place(*boxes, step, most, self.reds, self.ends, hands)
+        centres, halves = swept_hand(FREE_ROOM)
+        steps = _first_place(*boxes, step, most, self.reds, self.ends, self.ways, centres, halves)
         return None if steps < 0 else int(steps)
 
     def holds(self, boxes: BoxSet) -> bool:
@@ -192,7 +189,9 @@ def _first_place(
     most: int,
     reds: BoxSet,
     ends: FloatArray,
-    hands: tuple[tuple[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]],
+    ways: FloatArray,
+    swept: FloatArray,
+    swept_halves: FloatArray,
 ) -> int:
     """The compiled part of ``Room.first_place``; -1: none."""
     for count in range(most + 1):
@@ -202,9 +201,9 @@ def _first_place(
         if any_pair_meets(centres, turns, halves + _TARGET_GAP, reds[0], reds[1], reds[2]):
             continue
         free = True
-        for ways, swept, swept_halves in hands:
-            for end in range(len(ends)):
-                free = free and not np.any(any_meets(ends[end], ways, centres, turns, halves, swept, swept_halves))
+        for end in range(len(ends)):
+            if free and np.any(any_meets(ends[end], ways, centres, turns, halves, swept, swept_halves)):
+                free = False
         if free:
             return count
     return -1

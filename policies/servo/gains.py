@@ -42,8 +42,10 @@ class ServoGains:
     """... or it has looked for so long, s."""
     costs: WayCosts = field(default_factory=WayCosts)
     """Of ways."""
-    obstacle_margin: float = 0.005
+    obstacle_margin: float = 0.002
     """Room to keep between hand and obstacles, m."""
+    way_margin: float = 0.012
+    """How far off remembered points may be, m: ways are compared by hands that are smaller and larger by this."""
     obstacle_evidence: float = 60.0
     """Evidence in the corridor (points times frames) that stops the approach; less slows it down."""
     retreat_gap: float = 0.08

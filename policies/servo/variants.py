@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fixation_gym.control.gaze import GazeGains
+from fixation_gym.control.ways import WayCosts
 from fixation_gym.perception.evidence_map import ZeroFlowSettings
 from fixation_gym.perception.fixation_constraint import ConstraintSettings
+from fixation_gym.perception.obstacle_memory import MemorySettings
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.tracking import TrackingSettings
 from policies.servo.gains import ServoGains
@@ -22,13 +24,30 @@ class ServoVariant:
     """What is left out, in a few words."""
     gains: ServoGains = field(default_factory=ServoGains)
     perception: PerceptionSettings = field(default_factory=PerceptionSettings)
+    memory: MemorySettings = field(default_factory=MemorySettings)
     avoid_obstacles: bool = True
-    """False leaves out the obstacle term."""
+    """False takes its map away: it comes in along its first line of sight."""
 
 
 VARIANTS: tuple[ServoVariant, ...] = (
     ServoVariant("servo", "nothing left out"),
-    ServoVariant("blind", "no obstacle term", avoid_obstacles=False),
+    ServoVariant("blind", "the map: it comes in along its first line of sight", avoid_obstacles=False),
+    ServoVariant(
+        "blind:slow",
+        "the map, as above; at most 0.04 m/s",
+        gains=ServoGains(approach_gain=0.06, approach_speed=0.04),
+        avoid_obstacles=False,
+    ),
+    ServoVariant(
+        "servo:no_memory",
+        "memory: only what is in view counts as an obstacle",
+        memory=MemorySettings(decay_s=0.1, decay_in_view_s=0.1, min_evidence=1.0),
+    ),
+    ServoVariant(
+        "servo:no_looking",
+        "looking before going: a way that was never looked at is as good as one that was",
+        gains=ServoGains(costs=WayCosts(unseen=0.0), seen_share=0.0),
+    ),
     ServoVariant(
         "servo:no_feed_forward",
         "gaze without feed-forward of the camera's own motion",

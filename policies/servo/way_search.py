@@ -76,7 +76,7 @@ class WaySearch:
             return np.zeros(2), 0.0
         present = T_base_cam[:3, 3] - target
         present /= np.linalg.norm(present)
-        self._ways = ways = known_ways(*obstacles, target, self._seen, 2.0 * gains.obstacle_margin)
+        self._ways = ways = known_ways(*obstacles, target, self._seen, gains.way_margin)
         near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
         if blocked and near and self._way is not None and self._arrived < math.inf:
             self._tried = np.vstack([self._tried, ways.directions[self._way]])

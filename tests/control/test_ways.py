@@ -3,9 +3,11 @@ import math
 import numpy as np
 import pytest
 
+from fixation_gym.control.corridor import level_axes
 from fixation_gym.control.reach import REACH_GRID, azimuth_range, directions, sample_direction
 from fixation_gym.control.ways import SeenSpace, WayCosts, chosen_way, known_ways, lateral_direction, way_costs
 from fixation_gym.geometry.rigid import look_at
+from fixation_gym.robot import TOOL_IN_CAMERA
 
 TARGET = np.array([0.55, 0.08, -0.08])
 BEARING = math.atan2(TARGET[1], TARGET[0])
@@ -40,9 +42,22 @@ def test_a_post_in_the_way_turns_the_hand_to_one_side():
     present = way_at(60, 45)
     points, weights = post_at(present)
     ways = known_ways(points, weights, TARGET, everything_seen(), 0.01)
-    assert ways.evidence[ways.nearest(present)] > 90.0
+    assert ways.evidence[ways.nearest(present)] > 60.0
     best = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS), None, COSTS)
     assert ways.evidence[best] < 30.0
+
+
+def test_what_is_deeper_in_a_corridor_counts_more():
+    way = way_at(60, 60)
+    nearest = known_ways(NONE, np.zeros(0), TARGET, everything_seen(), 0.01)
+    axes = level_axes(nearest.directions[[nearest.nearest(way)]])[0]
+    # The hand is widest at 0.104 m to the side, 0.08 m behind the finger tips.
+    beside = [np.array([x, TOOL_IN_CAMERA[1], -0.2]) @ axes + TARGET for x in (0.090, 0.100, 0.108, 0.120)]
+    counted = [
+        known_ways(point[None], np.array([30.0]), TARGET, everything_seen(), 0.01).evidence[nearest.nearest(way)]
+        for point in beside
+    ]
+    np.testing.assert_allclose(counted, [30.0, 20.0, 10.0, 0.0])
 
 
 def test_what_was_never_looked_at_is_shunned_and_so_is_what_was_tried():

@@ -69,7 +69,7 @@ def test_the_first_line_of_sight_and_most_other_ways_are_barred(name):
     for scene in scenes(name):
         end = scene.target.places[-1]
         free = ~barred_directions(end, still_boxes(scene), reachable_directions(end), 0.01)
-        assert free.mean() <= 0.30
+        assert free.mean() <= 0.33
         steep = REACH_GRID[:, 1] > np.radians(75.0)
         near_free = reachable_directions(end) @ Way(*scene.free_way).direction > np.cos(np.radians(12.0))
         if (steep & ~near_free).any():
@@ -86,7 +86,7 @@ def test_the_free_way_is_anywhere_in_the_reach():
     assert elevations.max() > 68.0
     assert np.ptp(np.degrees([azimuth for azimuth, _ in drawn])) > 60.0
     assert all(elevation > np.radians(59.0) for elevation in (scene.free_way[1] for scene in scenes("bin", 3)))
-    assert all(elevation < np.radians(59.0) for elevation in (scene.free_way[1] for scene in scenes("shelf", 3)))
+    assert all(elevation < np.radians(66.0) for elevation in (scene.free_way[1] for scene in scenes("shelf", 3)))
 
 
 @pytest.mark.parametrize("name", CROWDED)

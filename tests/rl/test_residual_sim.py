@@ -27,7 +27,7 @@ def test_without_a_residual_the_servo_picks_although_no_image_is_rendered_in_its
 
 
 def test_without_a_residual_the_servo_acts_and_with_one_the_camera_moves_to_that_side():
-    plain, helped, turned = (gym.make("FixationPick-v0", scenario="opaque", image_size=(96, 128)) for _ in range(3))
+    plain, helped, turned = (gym.make("FixationPick-v0", scenario="clear", image_size=(96, 128)) for _ in range(3))
     servo, helped, turned = make_policy("servo", plain), ResidualEnv(helped), ResidualEnv(turned)
     obs, _ = plain.reset(seed=3)
     helped.reset(seed=3)
