@@ -47,7 +47,7 @@ def test_bad_input_is_one_line_and_leaves_no_folder(
     command: str, option: str, value: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if (command, option) == ("ablate", "--policy"):  # ablations have variants instead
-        option, message = "--variant", "unknown variant 'best'; choose one of servo, blind, servo:no_feed_forward"
+        option, message = "--variant", "unknown variant 'best'; choose one of servo, blind, blind:slow"
     assert cli.main([command, "--out", str(tmp_path / "out"), option, value]) == 2
     assert message in error_line(capsys)
     assert list(tmp_path.iterdir()) == []

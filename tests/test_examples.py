@@ -3,6 +3,7 @@
 import importlib.util
 from pathlib import Path
 
+import cv2
 import pytest
 
 pytestmark = pytest.mark.sim
@@ -41,6 +42,14 @@ def test_a_few_lines_on_the_zero_flow_map_pick_the_object_up(capsys):
 def test_a_shipped_agent_lifts_the_object(capsys):
     assert load("05_trained_agent").main()
     assert "% of the map in front" in capsys.readouterr().out
+
+
+def test_the_contact_sheet_has_a_row_for_each_scenario(tmp_path):
+    path = load("06_contact_sheet").main(str(tmp_path / "scenes.png"), ("bin", "clear"), 2)
+    sheet = cv2.imread(str(path))
+    assert sheet.shape == (2 * 180, 2 * 240, 3)
+    with pytest.raises(SystemExit, match="cannot be written"):
+        load("06_contact_sheet").main(str(tmp_path / "nowhere" / "scenes.png"), ("clear",), 1)
 
 
 def test_examples_are_short_and_each_has_a_test():

@@ -148,7 +148,7 @@ def add_movers(
     scenario: Scenario, goal: Goal, view: View, barriers: list[ObstacleSpec], rng: np.random.Generator
 ) -> list[ObstacleSpec] | None:
     """The obstacles with those that move; None if there is no room for them."""
-    count = int(rng.integers(scenario.moving_count[0], scenario.moving_count[1] + 1))
+    count = scenario.moving_count[0]  # one number by now
     obstacles, hand = list(barriers), hand_boxes(view.pose)
     taken = view.taken + [obstacle.boxes for obstacle in obstacles]
     materials = [name for name in scenario.obstacle_materials if name != "mirror"]

@@ -62,7 +62,7 @@ class Goal:
 def sample_goal(scenario: Scenario, free_angles: tuple[float, float], rng: np.random.Generator) -> Goal:
     """Draw the target for a free way, given by its azimuth against the target's bearing and its elevation, rad."""
     target = sample_target(scenario, rng)
-    if scenario.target_moves > 0.0 and rng.random() < scenario.target_moves:
+    if scenario.target_moves:
         target = _pushed(target, scenario, rng)
     free = Way(math.atan2(target.position[1], target.position[0]) + free_angles[0], free_angles[1])
     target = replace(target, yaw=_grasped_yaw(target, free, rng))

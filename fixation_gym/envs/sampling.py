@@ -45,6 +45,7 @@ def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
     Raises:
         RuntimeError: if the scenario leaves no room for such a scene.
     """
+    scenario = _with_events_drawn(scenario, rng)
     low, high = (math.radians(angle) for angle in scenario.free_elevation_deg)
     for _ in range(_WAYS):
         free = sample_direction(rng, (low, high))
@@ -56,6 +57,17 @@ def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
     raise RuntimeError(
         f"no scene of scenario {scenario.name!r} found for {_WAYS} free ways; allow more obstacles, more kinds of "
         "them, or another range of free_elevation_deg"
+    )
+
+
+def _with_events_drawn(scenario: Scenario, rng: np.random.Generator) -> Scenario:
+    """The scenario with chances and counts drawn: drawn anew with every try, what has room easily would win."""
+    moving = int(rng.integers(scenario.moving_count[0], scenario.moving_count[1] + 1))
+    return replace(
+        scenario,
+        target_moves=float(rng.random() < scenario.target_moves),
+        distractor=float(rng.random() < scenario.distractor),
+        moving_count=(moving, moving),
     )
 
 
@@ -110,7 +122,7 @@ def _sample_view(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> Vi
         return None
     gaze = centre + rng.uniform(-0.06, 0.06, 3) * [1.0, 1.0, 0.0]
     distractor = None
-    if scenario.distractor > 0.0 and rng.random() < scenario.distractor:
+    if scenario.distractor:
         distractor = _sample_distractor(scenario, goal.target, rng)
         if not _told_apart(goal.target, distractor, camera, gaze):
             return None

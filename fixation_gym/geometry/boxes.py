@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fixation_gym.types import FloatArray
 
@@ -61,13 +60,11 @@ def joined(sets: Sequence[BoxSet]) -> BoxSet:
     return BoxSet(*(np.concatenate(arrays) for arrays in zip(*sets, strict=True)))
 
 
-@njit(cache=True)
 def rotations(yaws: FloatArray, pitches: FloatArray) -> FloatArray:
     """Rotations of yaw about z after pitch about y, both of shape (n,), rad; shape (n, 3, 3)."""
-    turns = np.zeros((len(yaws), 3, 3))
-    for i in range(len(yaws)):
-        cy, sy, cp, sp = np.cos(yaws[i]), np.sin(yaws[i]), np.cos(pitches[i]), np.sin(pitches[i])
-        turns[i, 0] = cy * cp, -sy, cy * sp
-        turns[i, 1] = sy * cp, cy, sy * sp
-        turns[i, 2] = -sp, 0.0, cp
+    cy, sy, cp, sp = np.cos(yaws), np.sin(yaws), np.cos(pitches), np.sin(pitches)
+    turns = np.zeros((len(cy), 3, 3))
+    turns[:, 0, 0], turns[:, 0, 1], turns[:, 0, 2] = cy * cp, -sy, cy * sp
+    turns[:, 1, 0], turns[:, 1, 1], turns[:, 1, 2] = sy * cp, cy, sy * sp
+    turns[:, 2, 0], turns[:, 2, 2] = -sp, cp
     return turns
