@@ -61,7 +61,7 @@ def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
 
 
 def _with_events_drawn(scenario: Scenario, rng: np.random.Generator) -> Scenario:
-    """The scenario with chances and counts drawn: drawn anew with every try, what has room easily would win."""
+    """The scenario with chances and counts drawn once: drawn with every try, what has room easily would win."""
     moving = int(rng.integers(scenario.moving_count[0], scenario.moving_count[1] + 1))
     return replace(
         scenario,
