@@ -35,17 +35,17 @@ def azimuth_range(elevation: float) -> tuple[float, float]:
 
 
 def sample_direction(
-    rng: np.random.Generator, elevations: tuple[float, float] = (LOWEST, HIGHEST)
+    rng: np.random.Generator, elevation: float, shape: tuple[float, float] = (1.0, 1.0)
 ) -> tuple[float, float]:
-    """Azimuth against the target's bearing and elevation, rad, of a direction drawn evenly over the reach's area."""
-    low, high = max(elevations[0], LOWEST), min(elevations[1], HIGHEST)
-    widest = azimuth_range(high)
-    while True:
-        elevation = math.asin(rng.uniform(math.sin(low), math.sin(high)))
-        azimuth = rng.uniform(*widest)
-        first, last = azimuth_range(elevation)
-        if first <= azimuth <= last:
-            return azimuth, elevation
+    """Azimuth against the target's bearing and elevation, rad, of a direction in the reach at that elevation, rad.
+
+    Args:
+        rng: generator.
+        elevation: within the reach.
+        shape: of the beta distribution of the azimuth over the reach.
+    """
+    low, high = azimuth_range(elevation)
+    return low + (high - low) * float(rng.beta(*shape)), elevation
 
 
 def _grid() -> FloatArray:

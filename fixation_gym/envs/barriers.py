@@ -21,9 +21,9 @@ from fixation_gym.types import FloatArray, MaskArray
 
 _BARRED_DEPTH = 0.01
 """A way is barred if a hand smaller by this would still touch something, m."""
-_MOST_OPEN = 0.33
+_MOST_OPEN = 0.31
 """Largest share of the ways that is not barred in the end."""
-_MOST_AMONG = 0.40
+_MOST_AMONG = 0.36
 """Largest share of the ways among which the free one is drawn that is not barred."""
 _ABOVE: MaskArray = REACH_GRID[:, 1] > math.radians(75.0)
 """Which ways of the reach's grid come from above."""
@@ -37,10 +37,14 @@ _LEAST_VISIBLE = 0.5
 """Least share of the target that is in view at the start, through glass or past everything else."""
 _BEYOND = (0.2, 0.9)
 """Range of the angle by which an obstacle stands beyond the way that it is to bar, seen from the free one, rad."""
+_ACROSS = (0.0, 0.3)
+"""The same for what is to stand in a line of sight, rad."""
 _STEP_OUT = 0.02
 """An obstacle that is in the free way is moved out by this much at a time, m."""
-_FIRST_CANDIDATES, _CANDIDATES, _MOVER_TRIES = 12, 36, 40
-"""Candidates for the first obstacle and for the others, and tries for those that move."""
+_FIRST_CANDIDATES, _CANDIDATES = 12, 36
+"""Candidates for the first obstacle and for the others."""
+_ACROSS_TRIES, _MOVER_TRIES = 40, 40
+"""Tries for what is to stand in a line of sight, and for what moves."""
 _THING = OBSTACLE_KINDS[0]
 
 
@@ -101,6 +105,10 @@ class Pool:
         clashes |= np.outer(mirrors, mirrors)  # MuJoCo draws one reflection only
         return cls(candidates, barred, clashes, np.array([candidate.first for candidate in candidates]))
 
+    def can_bar(self, goal: Goal) -> bool:
+        """Whether all of them together would bar enough."""
+        return _are_barred(goal, ~np.logical_or.reduce(self.barred, axis=0))
+
 
 def draw_candidates(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> list[Candidate]:
     """Obstacles that leave the free way, each as if it were alone; none if there is none to begin with."""
@@ -114,9 +122,9 @@ def draw_candidates(scenario: Scenario, goal: Goal, rng: np.random.Generator) ->
 def draw_across(scenario: Scenario, goal: Goal, view: View, rng: np.random.Generator) -> list[Candidate]:
     """First obstacles that the first line of sight passes through."""
     sight = goal.ways[view.first_sight]
-    drawn = [_draw_candidate(scenario, goal, True, sight, rng) for _ in range(_FIRST_CANDIDATES)]
-    through = (item for item in drawn if item is not None)
-    return [item for item in through if passes_through(item.draft.box, view.camera, goal.room.ends[0])]
+    drawn = (_draw_draft(scenario, goal, True, sight, _ACROSS, rng) for _ in range(_ACROSS_TRIES))
+    through = [item for item in drawn if item and passes_through(item.box, view.camera, goal.room.ends[0])]
+    return [_candidate(goal, draft, True) for draft in through[:_FIRST_CANDIDATES]]
 
 
 def bar_ways(
@@ -185,15 +193,19 @@ def _covering(scenario: Scenario, goal: Goal, view: View, pool: Pool, first: int
 
 
 def _is_barred(goal: Goal, view: View, open_ways: MaskArray) -> bool:
-    """Whether the first line of sight and enough of all other ways are barred.
+    """Whether the first line of sight and enough of all other ways are barred."""
+    return not open_ways[view.first_sight] and _are_barred(goal, open_ways)
+
+
+def _are_barred(goal: Goal, open_ways: MaskArray) -> bool:
+    """Whether enough ways are barred.
 
     Also of those from above, and of those among which the free one is drawn: a shelf leaves only low ways, and a hand
     that always comes in low must not find most of them open.
     """
     above = _ABOVE & ~goal.near_free
     return bool(
-        not open_ways[view.first_sight]
-        and open_ways.mean() <= _MOST_OPEN
+        open_ways.mean() <= _MOST_OPEN
         and open_ways[goal.drawn_among].mean() <= _MOST_AMONG
         and (not above.any() or open_ways[above].mean() <= _MOST_ABOVE)
     )
@@ -212,8 +224,28 @@ def _is_discovered(goal: Goal, view: View, chosen: list[Candidate], obstacles: l
 def _draw_candidate(
     scenario: Scenario, goal: Goal, first: bool, way: FloatArray, rng: np.random.Generator
 ) -> Candidate | None:
-    """An obstacle to bar ``way``, as near to the target as the free ways allow; None if it has no room."""
-    beyond = _beyond(goal.free.direction, way, rng.uniform(*_BEYOND))
+    """An obstacle to bar ``way``; None if it has no room."""
+    draft = _draw_draft(scenario, goal, first, way, _BEYOND, rng)
+    return None if draft is None else _candidate(goal, draft, first)
+
+
+def _candidate(goal: Goal, draft: Draft, first: bool) -> Candidate:
+    return Candidate(draft, barred_directions(goal.room.ends[-1], draft.boxes, goal.ways, _BARRED_DEPTH), first)
+
+
+def _draw_draft(
+    scenario: Scenario,
+    goal: Goal,
+    first: bool,
+    way: FloatArray,
+    past: tuple[float, float],
+    rng: np.random.Generator,
+) -> Draft | None:
+    """An obstacle beyond ``way`` by an angle in ``past``, as near to the target as the free ways allow.
+
+    None if it has no room.
+    """
+    beyond = _beyond(goal.free.direction, way, rng.uniform(*past))
     drawn = draw_kind(scenario, first, float(beyond[2]), rng)
     if drawn is None:
         return None
@@ -224,10 +256,7 @@ def _draw_candidate(
     outward = bearing + math.pi if kind.around else bearing  # what stands around the target draws back from the way
     step = np.array([-_STEP_OUT * math.cos(outward), -_STEP_OUT * math.sin(outward), 0.0])
     steps = goal.room.first_place(draft.boxes, step, int((farthest - nearest) / _STEP_OUT))
-    if steps is None:
-        return None
-    draft = draft.moved(steps * step)
-    return Candidate(draft, barred_directions(goal.room.ends[-1], draft.boxes, goal.ways, _BARRED_DEPTH), first)
+    return None if steps is None else draft.moved(steps * step)
 
 
 def _way(goal: Goal, rng: np.random.Generator) -> FloatArray:

@@ -50,7 +50,7 @@ class Scenario:
     target_shapes: tuple[str, ...] = tuple(shape.name for shape in TARGET_SHAPES)
     grasp_width: tuple[float, float] = (0.025, 0.07)
     """Range of the target's width between the fingers, m."""
-    view_elevation_deg: tuple[float, float] = (40.0, 55.0)
+    view_elevation_deg: tuple[float, float] = (40.0, 60.0)
     """Range of the angle by which the camera first looks down at the target, deg."""
     through_sight: bool = False
     """Whether the first line of sight to the target's centre passes through the first obstacle."""
@@ -140,7 +140,6 @@ def _require_probability(field: str, value: float) -> None:
         raise ValueError(f"{field} must be a number within 0..1, got {value!r}")
 
 
-_UPRIGHT = ("thing", "wall", "leaning_board")
 _SCREEN = Scenario(
     "screen",
     ("translucent",),
@@ -158,7 +157,7 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario(
             "line_of_sight",
             ("translucent", "wire"),
-            first_kinds=_UPRIGHT,
+            first_kinds=("thing", "wall", "leaning_board", "arch", "hanging", "roof", "shelf"),
             obstacle_count=(2, 6),
             through_sight=True,
         ),
@@ -180,14 +179,14 @@ SCENARIOS: dict[str, Scenario] = {
             ("opaque", "translucent", "wire"),
             first_kinds=("cabinet", "shelf", "roof"),
             obstacle_count=(2, 6),
-            free_elevation_deg=(40.0, 65.0),
+            free_elevation_deg=(40.0, 70.0),
         ),
         Scenario(
             "bin",
             ("opaque", "translucent", "wire"),
             first_kinds=("bin",),
             obstacle_count=(2, 6),
-            free_elevation_deg=(60.0, 85.0),
+            free_elevation_deg=(55.0, 82.0),
         ),
         Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
         Scenario(

@@ -1,6 +1,6 @@
 """Sampling of scenes: the free way is drawn first, then obstacles are placed until all other ways are barred.
 
-A way is straight, level and comes from some direction of the arm's reach. The free one is drawn evenly over the reach,
+A way is straight, level and comes from some direction of the arm's reach. The free one may come from anywhere in it,
 so no habit can know it; a cone around it stays free with room to spare, whatever moves (``goal.py``). Obstacles are
 drawn that leave it, and those are taken that bar the first line of sight, the ways from above and most others
 (``barriers.py``). Pure: one generator in, one value out.
@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import colorsys
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
 from fixation_gym.envs.shapes import Vector
 from fixation_gym.types import FloatArray
 
-_VIEW_AZIMUTHS = (math.radians(32.0), math.radians(72.0))
+_VIEW_AZIMUTHS = (math.radians(30.0), math.radians(82.0))
 """Range of the azimuth of the first view against the target's bearing, rad: the arm can start there at any height."""
 _VIEW_DISTANCE = (0.42, 0.49)
 """Range of the distance between camera and target at the start, m."""
@@ -35,8 +37,13 @@ _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
 _FRAME_HUES = (1.0 / 8.0, 7.0 / 8.0)
 """Range of the hue of coloured frames, 0..1: anything but the target's red."""
-_WAYS, _TARGETS, _VIEWS = 60, 25, 8
-"""Free ways, targets for each, and first views for each of them that are tried."""
+_ELEVATION_SHAPE, _AZIMUTH_SHAPE = (0.5, 0.65), (0.75, 0.6)
+"""Beta distributions of the free way's elevation and azimuth over the reach. Evenly drawn, ways in the middle would be
+free most often, for there are ways on all sides of them that take them along; so the ends come up more."""
+_ELEVATIONS, _AZIMUTHS, _TARGETS = 6, 8, 40
+"""Elevations of the free way, azimuths for each and targets for each of those that are tried."""
+_VIEWS, _VIEW_DRAWS = 4, 24
+"""First views apart from the free way that are tried for each target, and views that are drawn for that."""
 
 
 def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
@@ -46,18 +53,28 @@ def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
         RuntimeError: if the scenario leaves no room for such a scene.
     """
     scenario = _with_events_drawn(scenario, rng)
-    low, high = (math.radians(angle) for angle in scenario.free_elevation_deg)
-    for _ in range(_WAYS):
-        free = sample_direction(rng, (low, high))
-        # The same way is tried again, or those that are easily left free would come up more often.
-        for _ in range(_TARGETS):
-            scene = _propose(scenario, free, rng)
-            if scene is not None:
-                return scene
+    for free in _free_ways(scenario, rng):
+        scene = _propose(scenario, free, rng)
+        if scene is not None:
+            return scene
     raise RuntimeError(
-        f"no scene of scenario {scenario.name!r} found for {_WAYS} free ways; allow more obstacles, more kinds of "
-        "them, or another range of free_elevation_deg"
+        f"no scene of scenario {scenario.name!r} found for {_ELEVATIONS * _AZIMUTHS} free ways; allow more obstacles, "
+        "more kinds of them, or another range of free_elevation_deg"
     )
+
+
+def _free_ways(scenario: Scenario, rng: np.random.Generator) -> Iterator[tuple[float, float]]:
+    """Azimuth and elevation, rad, of the free ways to try.
+
+    The same is tried again and again, or those that are easily left free would come up more often.
+    """
+    low, high = (math.radians(angle) for angle in scenario.free_elevation_deg)
+    for _ in range(_ELEVATIONS):
+        elevation = low + (high - low) * float(rng.beta(*_ELEVATION_SHAPE))
+        for _ in range(_AZIMUTHS):
+            free = sample_direction(rng, elevation, _AZIMUTH_SHAPE)
+            for _ in range(_TARGETS):
+                yield free
 
 
 def _with_events_drawn(scenario: Scenario, rng: np.random.Generator) -> Scenario:
@@ -76,14 +93,13 @@ def _propose(scenario: Scenario, free: tuple[float, float], rng: np.random.Gener
     crowded = scenario.obstacle_count[1] + scenario.moving_count[1] > 0
     candidates = draw_candidates(scenario, goal, rng) if crowded else []
     pool = Pool.of(candidates) if candidates else None
-    for _ in range(_VIEWS):
-        view = _sample_view(scenario, goal, rng)
-        if view is None:
-            continue
-        if not crowded:
-            return _scene(scenario, goal, view, (), rng)
-        if pool is None or not view.is_apart(goal):
-            continue
+    views = (_sample_view(scenario, goal, rng) for _ in range(_VIEW_DRAWS))
+    if not crowded:
+        view = next((view for view in views if view), None)
+        return None if view is None else _scene(scenario, goal, view, (), rng)
+    if pool is None or not pool.can_bar(goal):
+        return None
+    for view in islice((view for view in views if view and view.is_apart(goal)), _VIEWS):
         if scenario.through_sight:
             pool = Pool.of([*draw_across(scenario, goal, view, rng), *candidates])
         barriers = bar_ways(scenario, goal, view, pool, rng)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.control.corridor import level_axes
-from fixation_gym.control.reach import REACH_GRID, azimuth_range, directions, sample_direction
+from fixation_gym.control.reach import azimuth_range, directions, sample_direction
 from fixation_gym.control.ways import SeenSpace, WayCosts, chosen_way, known_ways, lateral_direction, way_costs
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.robot import TOOL_IN_CAMERA
@@ -89,13 +89,14 @@ def test_the_lateral_direction_leads_to_the_way(way):
     assert after == pytest.approx(angle - 0.05 / 0.45, abs=0.01)
 
 
-def test_directions_are_drawn_evenly_over_the_reach():
+def test_directions_are_drawn_within_the_reach_and_from_all_of_it():
     rng = np.random.default_rng(0)
-    drawn = np.array([sample_direction(rng) for _ in range(2000)])
-    for azimuth, elevation in drawn:
+    for elevation in np.radians([40.0, 63.0, 85.0]):
         low, high = azimuth_range(elevation)
-        assert low <= azimuth <= high
-    cells = np.argmax(directions(drawn, TARGET) @ directions(REACH_GRID, TARGET).T, axis=1)
-    counts = np.bincount(cells, minlength=len(REACH_GRID))
-    assert counts.max() < 4.0 * counts.mean()
-    assert np.mean(counts == 0) < 0.05
+        drawn = np.array([sample_direction(rng, elevation) for _ in range(200)])
+        assert np.all(drawn[:, 1] == elevation)
+        azimuths = (drawn[:, 0] - low) / (high - low)
+        assert 0.0 <= azimuths.min() < 0.05
+        assert 0.95 < azimuths.max() <= 1.0
+        ends = np.array([sample_direction(rng, elevation, (0.3, 0.3))[0] for _ in range(200)])
+        assert np.std(ends) > np.std(drawn[:, 0])
