@@ -9,8 +9,8 @@ ARGS :=
 demo: core
 	$(VENV)/fixation-gym demo $(ARGS)
 
-test: full
-	$(VENV)/pytest $(ARGS)
+test: full  # on up to four cores
+	$(VENV)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 test-core: full  # the tier without simulator
 	$(VENV)/pytest -m "not sim" $(ARGS)
