@@ -20,6 +20,7 @@ from fixation_gym.types import FloatArray, MaskArray
 
 _NEIGHBOURHOOD = np.ones((5, 5), np.uint8)
 """Window of the flow, px of its grid."""
+_CORE = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,8 @@ class ObstacleMemory:
 
     keys: NDArray[np.int64]
     """Voxel indices, shape (n, 3), unique rows in lexicographic order."""
+    points: FloatArray
+    """Mean place of what was seen in each voxel, shape (n, 3), in base, m."""
     evidence: FloatArray
     """Frames in which each voxel was in front, faded, shape (n,)."""
     time: float
@@ -67,7 +70,7 @@ class ObstacleMemory:
     @classmethod
     def empty(cls, time: float = 0.0) -> ObstacleMemory:
         """Nothing seen yet."""
-        return cls(np.zeros((0, 3), np.int64), np.zeros(0), time)
+        return cls(np.zeros((0, 3), np.int64), np.zeros((0, 3)), np.zeros(0), time)
 
 
 def remember(
@@ -98,19 +101,34 @@ def remember(
     faded = memory.evidence * np.exp(-max(0.0, time - memory.time) / decay_s)
     faded = faded * np.where(contradicted, settings.contradiction, 1.0)
     seen = _standing_points(zero_flow, intrinsics, T_base_cam, settings, support_height_m)
-    new_keys = np.unique(np.floor(seen / settings.voxel_m).astype(np.int64), axis=0)
+    new_keys, new_points = _by_voxel(seen, settings.voxel_m)
     keys, index = np.unique(np.concatenate([memory.keys, new_keys]), axis=0, return_inverse=True)
-    evidence = np.zeros(len(keys))
-    np.add.at(evidence, index.ravel(), np.concatenate([faded, np.ones(len(new_keys))]))
-    evidence = np.minimum(evidence, settings.saturation)
+    weights = np.concatenate([faded, np.ones(len(new_keys))])
+    evidence, points = _sums(index.ravel(), weights, np.concatenate([memory.points, new_points]), len(keys))
     keep = evidence > settings.forget_below
-    return ObstacleMemory(keys[keep], evidence[keep], time)
+    evidence = np.minimum(evidence[keep], settings.saturation)
+    return ObstacleMemory(keys[keep], points[keep], evidence, time)
+
+
+def _by_voxel(points: FloatArray, voxel_m: float) -> tuple[NDArray[np.int64], FloatArray]:
+    """Voxel indices of points, unique, shape (n, 3), and the mean of the points in each, shape (n, 3)."""
+    keys, index = np.unique(np.floor(points / voxel_m).astype(np.int64), axis=0, return_inverse=True)
+    return keys, _sums(index.ravel(), np.ones(len(points)), points, len(keys))[1]
+
+
+def _sums(
+    index: NDArray[np.intp], weights: FloatArray, points: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Sum of the weights with each index, shape (count,), and weighted mean of the points, shape (count, 3)."""
+    total = np.bincount(index, weights, count)
+    sums = [np.bincount(index, weights * column, count) for column in points.T]
+    return total, np.stack(sums, axis=-1) / np.maximum(total, 1e-12)[:, None]
 
 
 def believed_points(memory: ObstacleMemory, settings: MemorySettings) -> tuple[FloatArray, FloatArray]:
     """Points with enough evidence, shape (n, 3) in base in m, and their evidence, shape (n,)."""
     believed = memory.evidence >= settings.min_evidence
-    return (memory.keys[believed] + 0.5) * settings.voxel_m, memory.evidence[believed]
+    return memory.points[believed], memory.evidence[believed]
 
 
 def _standing_points(
@@ -133,7 +151,7 @@ def _standing_points(
         standing |= known & above & near
     # At an outline the flow's window mixes the thing with what is behind it; the thing is the nearest in sight there.
     nearest = cv2.dilate(np.where(standing, zero_flow.inverse_depth, np.float32(0.0)), _NEIGHBOURHOOD)
-    rows, columns = np.nonzero(standing)
+    rows, columns = np.nonzero(cv2.erode(standing.astype(np.uint8), _CORE))
     depth = 1.0 / nearest[rows, columns].astype(np.float64)
     rays = np.stack([x[rows, columns], y[rows, columns], np.ones(len(rows))], axis=-1)
     return transform(T_base_cam, rays * depth[:, None])
@@ -178,7 +196,7 @@ def _looked_at(
     settings: MemorySettings,
 ) -> tuple[MaskArray, MaskArray]:
     """Points near whose pixel something is known, and those where it is clearly behind them; each of shape (n,)."""
-    points = transform(inverse(T_base_cam), (memory.keys + 0.5) * settings.voxel_m)
+    points = transform(inverse(T_base_cam), memory.points)
     with np.errstate(invalid="ignore"):
         pixels = np.rint(intrinsics.project(points))
         in_view = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)

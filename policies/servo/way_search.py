@@ -78,7 +78,8 @@ class WaySearch:
         present /= np.linalg.norm(present)
         self._ways = ways = known_ways(*obstacles, target, self._seen, gains.way_margin)
         near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
-        if blocked and near and self._way is not None and self._arrived < math.inf:
+        waited = percept.time - self._arrived > gains.look_seconds
+        if blocked and (near or waited) and self._way is not None and self._arrived < math.inf:
             self._tried = np.vstack([self._tried, ways.directions[self._way]])
             self._arrived = math.inf
         cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs)
