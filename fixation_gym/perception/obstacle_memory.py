@@ -21,6 +21,8 @@ from fixation_gym.types import FloatArray, MaskArray
 _NEIGHBOURHOOD = np.ones((5, 5), np.uint8)
 """Window of the flow, px of its grid."""
 _CORE = np.ones((3, 3), np.uint8)
+"""What of a pixel's surroundings must stand there, too: the window smears every outline by up to two pixels; what is
+thin appears as wide as the window, so something is left of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +122,7 @@ def _sums(
     index: NDArray[np.intp], weights: FloatArray, points: FloatArray, count: int
 ) -> tuple[FloatArray, FloatArray]:
     """Sum of the weights with each index, shape (count,), and weighted mean of the points, shape (count, 3)."""
-    total = np.bincount(index, weights, count)
+    total = np.bincount(index, weights, count).astype(np.float64)
     sums = [np.bincount(index, weights * column, count) for column in points.T]
     return total, np.stack(sums, axis=-1) / np.maximum(total, 1e-12)[:, None]
 

@@ -41,6 +41,19 @@ def test_what_is_in_front_for_several_frames_is_remembered_where_it_is():
     assert np.abs(in_camera[:, :2]).max() < 0.06
 
 
+def test_points_lie_on_the_surface_and_within_the_outline():
+    half = 5
+    points, _ = believed_points(see(patch(1.0, half=half), 7), SETTINGS)
+    in_camera = (points - POSE[:3, 3]) @ POSE[:3, :3]
+    assert in_camera[:, 2] == pytest.approx(np.full(len(points), 0.3), abs=1e-6)
+    # The flow's window smears a thing over its outline, so the outermost pixels are left out.
+    pixels = CAMERA.project(in_camera)
+    assert np.all(pixels[:, 0] >= 30 - half + 1 - 1e-6)
+    assert np.all(pixels[:, 0] <= 30 + half - 2 + 1e-6)
+    assert np.all(pixels[:, 1] >= 20 - half + 1 - 1e-6)
+    assert np.all(pixels[:, 1] <= 20 + half - 2 + 1e-6)
+
+
 def test_a_single_frame_a_doubtful_or_an_inexact_one_is_not_believed():
     for zero_flow, frames in ((patch(1.0), 1), (patch(0.9), 20), (patch(1.0, relative_std=0.3), 20)):
         points, _ = believed_points(see(zero_flow, frames), SETTINGS)
