@@ -18,6 +18,8 @@ from fixation_gym.types import FloatArray, MaskArray
 
 _RADII = (0.08, 0.13, 0.18, 0.23, 0.28, 0.33)
 """Distances from the target of the places that are looked at, m."""
+_ASIDE = 0.03
+"""What is nearer to the line of sight than this is in view; if it was not seen, looking at it helps no more, m."""
 _TRIED_WITHIN = math.cos(math.radians(14.0))
 """Cosine of the angle within which ways count as the one that was tried."""
 
@@ -62,6 +64,30 @@ class SeenSpace:
     def with_seen(self, seen: MaskArray) -> SeenSpace:
         """With more places seen."""
         return replace(self, seen=self.seen | seen)
+
+    def least_seen_share(self, way: int) -> float:
+        """Share seen of the corridor of the way with that index, at the distance from the target where it is least."""
+        places = _IN_CORRIDORS[way].reshape(len(_RADII), -1)
+        return float(np.min((places * self.seen.reshape(len(_RADII), -1)).sum(axis=1) / places.sum(axis=1)))
+
+    def towards_unseen(self, way: int, target: FloatArray, present: FloatArray) -> FloatArray:
+        """From the line of sight to the nearest place in a way's corridor that was not looked at.
+
+        The nearest: seen from between two such places, one of them wins and is looked at first.
+
+        Args:
+            way: index.
+            target: in base, shape (3,), m.
+            present: unit vector from target to camera, shape (3,).
+
+        Returns:
+            Vector across the line of sight, shape (3,), in base, m; zero if all was seen.
+        """
+        places = (self.places(target) - target)[(_IN_CORRIDORS[way] > 0.0) & ~self.seen]
+        aside = places - np.outer(places @ present, present)
+        offset = np.linalg.norm(aside, axis=1)
+        aside, offset = aside[offset > _ASIDE], offset[offset > _ASIDE]
+        return aside[np.argmin(offset)] if len(aside) else np.zeros(3)
 
     @property
     def unseen_shares(self) -> FloatArray:

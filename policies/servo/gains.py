@@ -36,10 +36,14 @@ class ServoGains:
     """The camera goes around the target at this distance at least, m: farther out than what stands there."""
     on_way: float = math.radians(7.0)
     """Angle to its way within which the hand goes in, rad."""
-    seen_share: float = 0.6
-    """Share of a corridor that must have been looked at before the hand goes in ..."""
-    look_seconds: float = 1.5
-    """... or it has looked for so long, s."""
+    seen_share: float = 0.75
+    """Share of a corridor, at every distance from the target, that must have been seen before the hand goes in ..."""
+    look_seconds: float = 3.0
+    """... or it has looked for so long, s. Near by the hand is wider than the image, so it looks to both sides."""
+    look_angle: float = 0.12
+    """Angle about the target by which it wants to go aside while it looks, rad."""
+    wait_seconds: float = 1.5
+    """A way that stays surely barred for so long was tried in vain, s."""
     costs: WayCosts = field(default_factory=WayCosts)
     """Of ways."""
     obstacle_margin: float = 0.002

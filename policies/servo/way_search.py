@@ -78,7 +78,7 @@ class WaySearch:
         present /= np.linalg.norm(present)
         self._ways = ways = known_ways(*obstacles, target, self._seen, gains.way_margin)
         near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
-        waited = percept.time - self._arrived > gains.look_seconds
+        waited = percept.time - self._arrived > gains.wait_seconds
         if blocked and (near or waited) and self._way is not None and self._arrived < math.inf:
             self._tried = np.vstack([self._tried, ways.directions[self._way]])
             self._arrived = math.inf
@@ -89,11 +89,22 @@ class WaySearch:
         direction, angle = lateral_direction(T_base_cam, present, ways.directions[way])
         if angle < gains.on_way and self._arrived == math.inf:
             self._arrived = percept.time
-        return direction, angle
+        if near or self._arrived == math.inf or self.may_enter(percept.time):
+            return direction, angle
+        return self._look_aside(way, T_base_cam, target, present)
+
+    def _look_aside(
+        self, way: int, T_base_cam: FloatArray, target: FloatArray, present: FloatArray
+    ) -> tuple[FloatArray, float]:
+        """Lateral direction in ``cam`` to where more of a way's corridor comes into view, and an angle to go, rad."""
+        assert self._seen is not None
+        aside = T_base_cam[:3, :2].T @ self._seen.towards_unseen(way, target, present)
+        offset = float(np.linalg.norm(aside))
+        return (aside / offset, self._gains.look_angle) if offset > 0.0 else (np.zeros(2), 0.0)
 
     def may_enter(self, time: float) -> bool:
         """Whether the hand may go in on its way at ``time`` s: it was looked at, or looking longer did not help."""
-        if self._ways is None or self._way is None:
+        if self._seen is None or self._way is None:
             return False
-        seen = 1.0 - float(self._ways.unseen[self._way])
+        seen = self._seen.least_seen_share(self._way)
         return seen > self._gains.seen_share or time - self._arrived > self._gains.look_seconds

@@ -73,6 +73,25 @@ def test_what_was_never_looked_at_is_shunned_and_so_is_what_was_tried():
     assert np.sum(tried != sighted) < 0.4 * len(tried)
 
 
+def test_looking_goes_first_to_the_nearest_place_in_the_corridor_that_was_not_seen():
+    ways, space = known_ways(NONE, np.zeros(0), TARGET, everything_seen(), 0.01), everything_seen()
+    way = ways.nearest(way_at(60, 60))
+    present = ways.directions[way]
+    assert space.least_seen_share(way) == 1.0
+    assert not space.towards_unseen(way, TARGET, present).any()
+    sideways = np.cross(present, [0.0, 0.0, 1.0])
+    sideways /= np.linalg.norm(sideways)
+    local = space.places(TARGET) - TARGET
+    far = np.linalg.norm(local, axis=1) > 0.3
+    for side, width in ((1.0, 0.06), (-1.0, 0.06), (1.0, 0.5)):
+        hidden = far & (side * (local @ sideways) > 0.05) & (side * (local @ sideways) < 0.05 + width)
+        looked = SeenSpace(space.bearing, ~hidden)
+        assert 0.5 < looked.least_seen_share(way) < 1.0
+        assert side * (looked.towards_unseen(way, TARGET, present) @ sideways) > 0.04
+        assert abs(looked.towards_unseen(way, TARGET, present) @ present) < 1e-9
+    assert SeenSpace.empty(BEARING).least_seen_share(way) == 0.0
+
+
 def test_a_way_is_kept_while_no_other_is_clearly_cheaper():
     cost = np.array([0.5, 0.45, 0.1])
     assert chosen_way(cost, 0, COSTS) == 2
