@@ -62,6 +62,8 @@ class ServoGains:
     """Speed at which the search rises while no way was chosen yet, m/s."""
     fixate_seconds: float = 0.8
     """Shortest time of looking before the approach: obstacles have to move in the image to be seen, s."""
+    fixate_patience: float = 2.0
+    """After this time without a sure distance it looks from farther up, s."""
     fixate_relative_std: float = 0.05
     """Relative distance error below which the approach starts."""
     grasp_tolerance: float = 1.10

@@ -255,6 +255,8 @@ class ServoPolicy:
             speed *= 0.3
         cycle = servo_laws.cyclic_velocity(percept.time, gains.cycle_amplitude, gains.cycle_rate)
         lateral = cycle + speed * direction
+        if self._phase is Phase.FIXATE and percept.time - self._phase_start > gains.fixate_patience:
+            lateral = cycle + np.array([0.0, -gains.search_climb])  # something hides part of the target; from above less does
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
         forward = self._forward_speed(percept, obstacle, certainty, angle)
         v = np.array([*lateral, -gains.retreat_speed if close else forward])

@@ -9,6 +9,7 @@ from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import CAMERA_FOVY, TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import Observation
+from policies.servo.gains import ServoGains
 from policies.servo.servo_policy import ServoPolicy
 
 INTRINSICS = Intrinsics.from_fovy(120, 160, CAMERA_FOVY)
@@ -91,6 +92,16 @@ def test_a_lost_target_is_recovered():
     trail = run(policy, START, 4.5, visible=lambda time: not 1.0 < time < 2.5)
     assert set(phases(trail)[round(1.9 / PERIOD) : round(2.4 / PERIOD)]) <= {"recover", "search"}
     assert phases(trail)[-1] in ("fixate", "approach")
+
+
+def test_without_a_sure_distance_it_looks_from_farther_up():
+    gains = ServoGains(fixate_relative_std=0.0)
+    trail = run(ServoPolicy(Perception(INTRINSICS), gains), START, gains.fixate_patience + 2.0)
+    assert phases(trail)[-1] == "fixate"
+    heights = [T_base_cam[2, 3] for *_, T_base_cam, _ in trail]
+    patient = round(gains.fixate_patience / PERIOD)
+    assert abs(heights[patient] - heights[0]) < 0.04
+    assert heights[-1] - heights[patient] > 0.05
 
 
 def test_a_reset_policy_repeats_itself():
