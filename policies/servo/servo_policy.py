@@ -256,7 +256,8 @@ class ServoPolicy:
         cycle = servo_laws.cyclic_velocity(percept.time, gains.cycle_amplitude, gains.cycle_rate)
         lateral = cycle + speed * direction
         if self._phase is Phase.FIXATE and percept.time - self._phase_start > gains.fixate_patience:
-            lateral = cycle + np.array([0.0, -gains.search_climb])  # something hides part of the target; from above less does
+            # Something hides part of the target; from farther up less does.
+            lateral = cycle + np.array([0.0, -gains.search_climb])
         lateral = gaze.within_reach(lateral, T_base_cam, fixation.point_base, gains.gaze)
         forward = self._forward_speed(percept, obstacle, certainty, angle)
         v = np.array([*lateral, -gains.retreat_speed if close else forward])
