@@ -63,7 +63,7 @@ def test_a_driven_obstacle_is_solid_and_yields_to_the_robot(env):
         assert np.linalg.norm(sim.data.xfrc_applied, axis=1).max() < 20.0
     assert collided
     assert info["clearance_m"] > -5e-3  # not pushed through
-    assert np.linalg.norm(sim.tool_position() - sim.body_position(body)) > 0.02
+    assert np.linalg.norm(sim.tool_position() - sim.body_position(body)) > 0.01  # the fingers may stand astride of it
 
 
 def test_a_pushed_obstacle_sleeps_moves_once_and_rests_displaced(env):

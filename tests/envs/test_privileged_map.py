@@ -25,7 +25,7 @@ def test_obstacles_are_seen_at_their_distance_whatever_they_are_made_of_and_noth
     scenario = {"obstacle_materials": kinds, "obstacle_count": (2, 6), "alpha": (0.3, 0.3)}
     env = make_zfc_env("privileged", scenario=scenario, image_size=SIZE)
     base, looked = env.unwrapped, set()
-    for seed in range(16):
+    for seed in range(32):
         obs, info = env.reset(seed=seed)
         pose = base.sim.arm_state().camera_pose
         depth = env._truth.depth(base.data)

@@ -50,4 +50,4 @@ def test_a_residual_does_not_lead_out_of_reach():
     for _ in range(150):
         shown, *_ = env.step(np.array([0.0, -1.0], np.float32))
         heights.append(np.degrees(np.arcsin(-shown["proprio"][12])))
-    assert 80.0 < max(heights) < 87.0  # elevation of the gaze: the servo stops rising at 84 degrees
+    assert 80.0 < max(heights) < 88.0  # elevation of the gaze: the servo stops rising at 84 degrees
