@@ -36,9 +36,12 @@ def sheet(scenarios: Sequence[str], scenes: int, seed: int = 0) -> np.ndarray:
 
 def main(path: str = "scenes.jpg", scenarios: Sequence[str] = SCENARIOS, scenes: int = 5) -> Path:
     """Write the sheet; returns its path."""
-    if not cv2.imwrite(path, cv2.cvtColor(sheet(scenarios, scenes), cv2.COLOR_RGB2BGR)):
+    file = Path(path)
+    if file.suffix not in (".jpg", ".png") or not file.parent.is_dir():
         raise SystemExit(f"{path} cannot be written; give the name of a .jpg or .png file in a folder that exists")
-    return Path(path)
+    if not cv2.imwrite(path, cv2.cvtColor(sheet(scenarios, scenes), cv2.COLOR_RGB2BGR)):
+        raise SystemExit(f"{path} could not be written")
+    return file
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from fixation_gym.perception.distance_filters import Fixation
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow import UNKNOWN, obstacle_centre
 from fixation_gym.types import FloatArray, ImageArray
@@ -121,13 +122,19 @@ def _draw_inset(canvas: ImageArray, cells: ImageArray) -> None:
     cv2.rectangle(canvas, (left, top), corner, (255, 255, 255), max(1, round(_unit(canvas))))
 
 
-def _draw_text(canvas: ImageArray, percept: Percept) -> None:
-    fixation = percept.fixation
+def distance_text(fixation: Fixation) -> str:
+    """What is known of the distance, in words."""
     if not fixation.initialised:
-        text = "target not seen yet"
+        return "target not seen yet"
+    if fixation.distance_std_m >= fixation.distance_m:
+        text = "distance unknown"
     else:
         text = f"{100 * fixation.distance_m:.1f} +- {100 * fixation.distance_std_m:.1f} cm"
-        text += "" if fixation.visible else " (lost)"
+    return text if fixation.visible else f"{text} (lost)"
+
+
+def _draw_text(canvas: ImageArray, percept: Percept) -> None:
+    text = distance_text(percept.fixation)
     unit = _unit(canvas)
     size, thickness = 0.9 * unit, max(1, round(2 * unit))
     (text_width, text_height), baseline = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, thickness)

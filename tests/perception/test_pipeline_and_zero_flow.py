@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 from functools import cache, partial
 
@@ -8,6 +9,7 @@ from pinhole_scene import Rectangle, Scene, fixating_pose, noise_texture, observ
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception import Perception, draw_overlay, obstacle_centre
+from fixation_gym.perception.drawing import distance_text
 from fixation_gym.perception.zero_flow import CELLS, UNKNOWN
 
 CAMERA = Intrinsics.from_fovy(160, 214, np.deg2rad(42.5))
@@ -256,3 +258,12 @@ def test_the_overlay_is_a_new_image_that_shows_the_evidence():
     front = cv2.resize((percept.zfc.p_nearer > 0.95).astype(np.uint8), (428, 320)).astype(bool)
     front[:100, 330:] = False
     assert picture[front].mean(axis=0)[0] > picture[front].mean(axis=0)[2] + 60  # orange
+
+
+def test_the_overlay_says_in_words_what_is_known_of_the_distance():
+    percept = run(POSTERS, 14)[1]
+    assert re.fullmatch(r"\d+\.\d \+- \d\.\d cm", distance_text(percept.fixation))
+    hidden = replace(percept.fixation, visible=False)
+    assert distance_text(hidden) == f"{distance_text(percept.fixation)} (lost)"
+    assert distance_text(replace(percept.fixation, distance_m=1000.0, distance_std_m=2e5)) == "distance unknown"
+    assert distance_text(replace(percept.fixation, initialised=False)) == "target not seen yet"
