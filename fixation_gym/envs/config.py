@@ -186,7 +186,7 @@ SCENARIOS: dict[str, Scenario] = {
             ("opaque", "translucent", "wire"),
             first_kinds=("bin",),
             obstacle_count=(2, 6),
-            free_elevation_deg=(55.0, 82.0),
+            free_elevation_deg=(46.0, 82.0),
         ),
         Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
         Scenario(

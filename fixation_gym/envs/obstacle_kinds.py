@@ -141,9 +141,9 @@ def _niche(material: str, rng: np.random.Generator) -> Parts:
 
 
 def _bin(material: str, rng: np.random.Generator) -> Parts:
-    """Four low walls, and a lid over the side that is turned away."""
-    half_x, half_y, top = rng.uniform(0.15, 0.19), rng.uniform(0.14, 0.18), rng.uniform(0.045, 0.085)
-    second, lid_height, lid_edge = _second(material), top + rng.uniform(0.05, 0.10), -rng.uniform(0.03, 0.08)
+    """Four low walls, and a lid over the half that is turned away."""
+    half_x, half_y, top = rng.uniform(0.15, 0.19), rng.uniform(0.14, 0.18), rng.uniform(0.03, 0.06)
+    second, lid_height, lid_edge = _second(material), top + rng.uniform(0.05, 0.10), -rng.uniform(0.02, 0.05)
     back = pane(material, half_y, 0.5 * lid_height, (-half_x, 0.0, 0.5 * lid_height))
     front = pane(second, half_y, 0.5 * top, (half_x, 0.0, 0.5 * top))
     half_depth = 0.5 * (lid_edge + half_x)
