@@ -38,6 +38,8 @@ class WayCosts:
     """Per time that it was tried in vain."""
     change: float = 0.12
     """A new way must be cheaper by this than the present one."""
+    low: float = 0.5
+    """For the lowest ways: the fingers are next to the table and can hardly turn to close on what stands askew."""
     strain: float = 0.15
     """At the border of the arm's reach."""
 
@@ -146,7 +148,8 @@ def way_costs(ways: Ways, present: FloatArray, tried: FloatArray, full_weight: f
     again = (ways.directions @ tried.T > _TRIED_WITHIN).sum(axis=1) if len(tried) else 0.0
     blocked = costs.blocked * np.log1p(ways.evidence / full_weight)
     unseen = costs.unseen * np.minimum(ways.unseen / costs.much_unseen, 1.0)
-    return turn + blocked + unseen + costs.tried * again + costs.strain * _AT_BORDER
+    arm = costs.strain * _AT_BORDER + costs.low * _LOW
+    return turn + blocked + unseen + costs.tried * again + arm
 
 
 def chosen_way(cost: FloatArray, before: int | None, costs: WayCosts) -> int:
@@ -197,3 +200,5 @@ def _at_border() -> FloatArray:
 _PLACES = _places()
 _IN_CORRIDORS = _in_corridors()
 _AT_BORDER = _at_border()
+_LOW = np.clip((math.radians(55.0) - REACH_GRID[:, 1]) / math.radians(15.0), 0.0, 1.0)
+"""1 for the lowest ways, 0 from 55 degrees on, shape (ways,)."""

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,6 +72,15 @@ def test_what_was_never_looked_at_is_shunned_and_so_is_what_was_tried():
     near = everything.directions @ present > math.cos(math.radians(10.0))
     assert np.all(tried[near] - sighted[near] == pytest.approx(COSTS.tried))
     assert np.sum(tried != sighted) < 0.4 * len(tried)
+
+
+def test_of_two_ways_equally_far_away_the_steeper_is_taken_but_a_low_one_if_only_that_is_free():
+    ways, present = known_ways(NONE, np.zeros(0), TARGET, everything_seen(), 0.01), way_at(60, 50)
+    cost = way_costs(ways, present, NONE, 60.0, COSTS)
+    assert cost[ways.nearest(way_at(60, 40))] - cost[ways.nearest(way_at(60, 60))] > 0.3
+    low = ways.nearest(way_at(60, 40))
+    barred = replace(ways, evidence=np.where(np.arange(len(cost)) == low, 0.0, 600.0))
+    assert chosen_way(way_costs(barred, present, NONE, 60.0, COSTS), None, COSTS) == low
 
 
 def test_looking_goes_first_to_the_nearest_place_in_the_corridor_that_was_not_seen():
