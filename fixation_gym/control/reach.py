@@ -34,15 +34,13 @@ def azimuth_range(elevation: float) -> tuple[float, float]:
     return math.radians(low), math.radians(high)
 
 
-def sample_direction(
-    rng: np.random.Generator, elevation: float, shape: tuple[float, float] = (1.0, 1.0)
-) -> tuple[float, float]:
+def sample_direction(rng: np.random.Generator, elevation: float, shape: tuple[float, float]) -> tuple[float, float]:
     """Azimuth against the target's bearing and elevation, rad, of a direction in the reach at that elevation, rad.
 
     Args:
         rng: generator.
         elevation: within the reach.
-        shape: of the beta distribution of the azimuth over the reach.
+        shape: of the beta distribution of the azimuth over the reach; (1, 1) is even.
     """
     low, high = azimuth_range(elevation)
     return low + (high - low) * float(rng.beta(*shape)), elevation

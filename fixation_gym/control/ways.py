@@ -129,7 +129,10 @@ def known_ways(points: FloatArray, weights: FloatArray, target: FloatArray, seen
         axes = level_axes(ways)
         local = np.einsum("kij,nj->kni", axes, points - target)
         # What is remembered is a centimetre or two off: the deeper it is in a corridor the more it counts.
-        depth = sum(in_corridor(local, room).astype(np.float64) for room in (-margin, 0.0, margin)) / 3.0
+        depth = in_corridor(local, margin).astype(np.float64)
+        within = local[depth > 0.0]  # the smaller hands lie in the largest one
+        depth[depth > 0.0] += in_corridor(within, 0.0) + in_corridor(within, -margin).astype(np.float64)
+        depth /= 3.0
         evidence = (depth * (local[..., 2] < 0.0)) @ weights
     return Ways(ways, evidence, seen.unseen_shares)
 

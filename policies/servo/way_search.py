@@ -9,7 +9,6 @@ import numpy as np
 
 from fixation_gym.control.ways import (
     SeenSpace,
-    Ways,
     chosen_way,
     known_ways,
     lateral_direction,
@@ -40,7 +39,6 @@ class WaySearch:
         """Start without knowledge."""
         self._gains = gains
         self._seen: SeenSpace | None = None
-        self._ways: Ways | None = None
         self._way: int | None = None
         self._arrived = math.inf
         self._tried = np.zeros((0, 3))
@@ -76,7 +74,7 @@ class WaySearch:
             return np.zeros(2), 0.0
         present = T_base_cam[:3, 3] - target
         present /= np.linalg.norm(present)
-        self._ways = ways = known_ways(*obstacles, target, self._seen, gains.way_margin)
+        ways = known_ways(*obstacles, target, self._seen, gains.way_margin)
         near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
         waited = percept.time - self._arrived > gains.wait_seconds
         if blocked and (near or waited) and self._way is not None and self._arrived < math.inf:

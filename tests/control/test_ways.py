@@ -122,7 +122,7 @@ def test_directions_are_drawn_within_the_reach_and_from_all_of_it():
     rng = np.random.default_rng(0)
     for elevation in np.radians([40.0, 63.0, 85.0]):
         low, high = azimuth_range(elevation)
-        drawn = np.array([sample_direction(rng, elevation) for _ in range(200)])
+        drawn = np.array([sample_direction(rng, elevation, (1.0, 1.0)) for _ in range(200)])
         assert np.all(drawn[:, 1] == elevation)
         azimuths = (drawn[:, 0] - low) / (high - low)
         assert 0.0 <= azimuths.min() < 0.05
