@@ -52,6 +52,16 @@ def test_the_contact_sheet_has_a_row_for_each_scenario(tmp_path):
         load("06_contact_sheet").main(str(tmp_path / "nowhere" / "scenes.png"), ("clear",), 1)
 
 
+def test_the_path_is_drawn_over_the_front_view_where_the_camera_was(tmp_path):
+    assert load("07_path_over_front_view").main(str(tmp_path / "path.png"), "clear", 1)
+    picture = cv2.imread(str(tmp_path / "path.png")).astype(int)
+    assert picture.shape == (2 * 360, 2 * 480, 3)
+    green = (picture[..., 1] > 150) & (picture[..., 0] < 120) & (picture[..., 2] < 90)
+    assert green.sum() > 500
+    with pytest.raises(SystemExit, match="cannot be written"):
+        load("07_path_over_front_view").main(str(tmp_path / "path.txt"), "clear", 1)
+
+
 def test_examples_are_short_and_each_has_a_test():
     names = sorted(path.stem for path in EXAMPLES.glob("*.py"))
     tests = Path(__file__).read_text()
