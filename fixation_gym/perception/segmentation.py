@@ -228,10 +228,12 @@ def _best_group(
 ) -> ImageArray:
     """Keep the best group of parts that lie closer together than the merge gap; shape of the window, 0 or 1."""
     step = _group_step(intrinsics.width)
-    columns, rows = intrinsics.width // step, intrinsics.height // step
+    # Rounded up here and for the part: a part starts at a whole step, so its places are some of the image's.
+    columns, rows = math.ceil(intrinsics.width / step), math.ceil(intrinsics.height / step)
     small, present = mask, mask
     if step > 1:
-        small = cv2.resize(mask * np.uint8(255), None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA)
+        size = (math.ceil(mask.shape[1] / step), math.ceil(mask.shape[0] / step))
+        small = cv2.resize(mask * np.uint8(255), size, interpolation=cv2.INTER_AREA)
         present = (small > 0).view(np.uint8)
     side = max(3, 2 * round(colour.merge_gap_fraction * columns / 2) + 1)
     count, labels = cv2.connectedComponents(cv2.dilate(present, _square(side)))

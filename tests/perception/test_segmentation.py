@@ -89,3 +89,20 @@ def test_without_a_target_nothing_is_seen_and_the_centroid_is_nan(noise):
     assert seen.area_fraction == 0
     assert np.isnan(seen.centroid).all()
     assert np.isnan(seen.second_moments).all()
+
+
+@pytest.mark.parametrize("size", [(480, 848), (768, 1024), (375, 500), (1208, 1928), (240, 320), (241, 321)])
+@pytest.mark.parametrize("corner", ["top left", "right", "bottom"])
+def test_any_image_size_can_show_the_target_at_any_edge_beside_something_else(size, corner):
+    height, width = size
+    camera = Intrinsics.from_fovy(height, width, 0.7)
+    image = np.full((height, width, 3), WOOD, np.uint8)
+    radius = width // 16
+    place = {"top left": (2, 3), "right": (width - 1, height // 2), "bottom": (width // 2, height - 1)}[corner]
+    other = (width // 4, height // 2 + 10)
+    for centre in (place, other):
+        cv2.circle(image, centre, radius, RED, -1)
+    seen = segment(image, camera, expected=camera.normalise(np.array(place)), reach=0.15)
+    assert seen.touches_border
+    assert seen.mask[min(place[1], height - 2), min(place[0], width - 2)]
+    assert not seen.mask[other[1], other[0]]
