@@ -120,9 +120,22 @@ def predict(state: FlowFilterState, dt: float, settings: FlowFilterSettings) -> 
         F[12:, :3] = dt * np.outer(n, n)
         F[12:, 3:6] = dt * skew(n)
         F[12:, 12:] += dt * ((n @ v) * np.eye(3) + np.outer(n, v) - skew(w))
-    mean[-1] = max(mean[-1], MIN_INVERSE_DEPTH)
     cov = F @ state.cov @ F.T + _process_noise(state, dt, settings)
-    return replace(state, mean=mean, cov=cov, age=state.age + dt)
+    return _bounded(replace(state, mean=mean, cov=cov, age=state.age + dt), settings)
+
+
+def _bounded(state: FlowFilterState, settings: FlowFilterSettings) -> FlowFilterState:
+    """Keep the inverse depth between that of 1 km and of 1 cm; a state that ran into the camera knows no distance."""
+    d = float(state.mean[-1])
+    if MIN_INVERSE_DEPTH <= d <= MAX_INVERSE_DEPTH:
+        return state
+    mean = state.mean.copy()
+    mean[-1] = min(max(d, MIN_INVERSE_DEPTH), MAX_INVERSE_DEPTH)
+    if d < MIN_INVERSE_DEPTH:  # its covariance says that it may be nearer
+        return replace(state, mean=mean)
+    if state.kind == "free":
+        mean[12:14] *= MAX_INVERSE_DEPTH / d
+    return _forget_depth(replace(state, mean=mean), settings)
 
 
 def _process_noise(state: FlowFilterState, dt: float, settings: FlowFilterSettings) -> FloatArray:
@@ -178,9 +191,9 @@ def update(
     inflation = 4.0 if rejected > 0.5 else 1.0
     cov = np.linalg.inv(np.linalg.inv(inflation * state.cov) + normal)
     mean = state.mean + cov @ vector
-    mean[-1] = max(mean[-1], MIN_INVERSE_DEPTH)
     suspicious = state.suspicious + 1 if nis / dof > settings.alarm_nis else 0
     updated = FlowFilterState(state.kind, mean, 0.5 * (cov + cov.T), nis / dof, rejected, suspicious, state.age)
+    updated = _bounded(updated, settings)
     return _forget_depth(updated, settings) if suspicious >= settings.alarm_count else updated
 
 
@@ -267,11 +280,11 @@ def distance_of(state: FlowFilterState, centroid: FloatArray | None = None) -> t
     else:
         ray = np.array([*(np.zeros(2) if centroid is None else centroid), 1.0])
         d, variance = float(ray @ state.mean[12:]), float(ray @ state.cov[12:, 12:] @ ray)
-    d = max(d, MIN_INVERSE_DEPTH)
+    d = min(max(d, MIN_INVERSE_DEPTH), MAX_INVERSE_DEPTH)
     return 1.0 / d, float(np.sqrt(variance)) / d**2
 
 
 _DRIFT_FRAMES = 10
 """A gaze error lasts for about this many frames, so it counts as so many independent ones."""
-MIN_INVERSE_DEPTH = 1e-3
-"""Objects farther than 1 km are put there, 1/m."""
+MIN_INVERSE_DEPTH, MAX_INVERSE_DEPTH = 1e-3, 1e2
+"""Objects farther than 1 km or nearer than 1 cm are put there, 1/m."""

@@ -201,3 +201,19 @@ def test_the_estimate_is_finite_and_positive_whatever_the_state():
         depth, std = distance_of(replace(state, mean=-state.mean))
         assert depth > 0.0
         assert np.isfinite([depth, std]).all()
+
+
+@pytest.mark.parametrize("kind", ["hard", "free"])
+def test_a_filter_that_runs_into_its_target_stays_finite_and_finds_the_distance_again(kind):
+    state = initialise(kind, SETTINGS)
+    for _ in range(400):  # 8 m straight on, without flow: the target must long have been passed
+        state = update(
+            predict(state, DT, SETTINGS), np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]), TWIST_COV, None, SETTINGS
+        )
+        assert np.isfinite([*distance_of(state), *state.cov.ravel()]).all()
+    assert distance_of(state)[0] == pytest.approx(0.01)
+    rng = np.random.default_rng(0)
+    for k in range(150):
+        centre, twist, samples = measured(k * DT, 0.4, True, rng)
+        state = predict(update(state, twist, TWIST_COV, samples, SETTINGS), DT, SETTINGS)
+    assert distance_of(state)[0] == pytest.approx(centre[2], rel=0.1)
