@@ -49,6 +49,9 @@ class DistanceSettings:
     """Largest accepted NIS: 99.9 % of chi-square with 2 degrees of freedom."""
     alarm_count: int = 4
     """Consecutive rejected centroids after which the object is taken to have moved and the filter restarts."""
+    farthest_m: float = 20.0
+    """An estimate beyond this is none, m: the filter begins again with its first guess, before it is sure of infinity
+    and deaf to what comes near."""
     flat_target: bool = False
     """Correct the slide of a flat target's centroid, Z (1 - 4 mu2); wrong for round ones."""
 
@@ -144,7 +147,7 @@ def update(
     image_std: float = 0.0,
     touches_border: bool = False,
 ) -> DistanceState:
-    """Take in one centroid by three Gauss-Newton steps; reject outliers, restart when they persist.
+    """Take in one centroid by three Gauss-Newton steps; reject outliers, restart when they persist or it runs far off.
 
     Args:
         state: estimate before.
@@ -164,6 +167,7 @@ def update(
         rejected = state.rejected + 1
         if rejected >= settings.alarm_count:
             depth, std, _ = distance_at(state, T_base_cam, settings)
+            depth = min(depth, settings.farthest_m)
             std = math.hypot(std, settings.jump_std_m)
             return restart(centroid, T_base_cam, depth, std, settings, image_std, touches_border)
         return replace(state, nis=nis, rejected=rejected)
@@ -171,6 +175,8 @@ def update(
         mean, _, gain, jacobian = correction(view, prior, mean, cov, seen, noise)
     gains = np.array(gain)  # (3, 2)
     keep = _IDENTITY - gains @ np.array(jacobian)
+    if mean[2] < 1.0 / settings.farthest_m:
+        return initialise(centroid, T_base_cam, settings, image_std, touches_border)
     posterior = keep @ state.cov @ keep.T + noise * (gains @ gains.T)  # Joseph form: stays positive
     return DistanceState(state.T_base_anchor, np.array(mean), posterior, nis, 0)
 
