@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from fixation_gym.perception.upright_body import (
     outline_of,
     unknown_body,
 )
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, MaskArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +39,22 @@ class CentreSettings:
     max_outlines: int = 32
     """When there are more, every second of the older half goes."""
     contradiction_px: float = 3.0
-    """A tangent that is seen farther out than the body reaches contradicts it, one farther in is covered."""
+    """A tangent that is seen by this farther out than the body reaches contradicts it, one farther in is covered ..."""
+    contradiction_m: float = 0.003
+    """... if it is by this much, too, m: no body is exactly of the fitted kind, which many pixels show close by."""
     moved_share: float = 0.1
-    """If this share of an outline contradicts the body, that has moved, or is another one."""
+    """If this share of an outline contradicts the body, that has moved, or is another one ..."""
+    moved_frames: int = 3
+    """... once so many frames, one by one, say so: a single one may be a bad image."""
     moved_misfit_px: float = 1.5
     """A known body that was moved fits its first outline as well as this, in the median."""
     doubts: int = 25
     """The body is forgotten after so many frames in sight, one by one, in which half of the outline is missing."""
+    parted_share: float = 0.25
+    """If this share of the outline is missing in every frame ..."""
+    parted_turn: float = 0.25
+    """... while the line of sight turns by this angle, nothing covers it, for that would move over it: the body was two
+    things that touched, and is forgotten, rad."""
     largest_half_size_m: float = 0.065
     """What is longer is two things that touch in the image."""
     believed_std_m: float = 0.006
@@ -66,6 +76,10 @@ class TargetBody:
     """What is known of a body that has moved; None: nothing but what the outlines say."""
     doubts: int = 0
     """Frames in sight, one after the other, in which half of the outline was missing."""
+    contradictions: int = 0
+    """Frames in sight, one after the other, that contradict the body."""
+    short_from: FloatArray | None = None
+    """Direction in base to the camera, shape (3,), since which part of the outline is missing in every frame."""
 
     def believed(self, T_base_cam: FloatArray, settings: CentreSettings) -> UprightBody | None:
         """The body, if its depth from this camera is sure enough."""
@@ -103,10 +117,15 @@ def with_outline(
     newest = outline_of(seen.mask, intrinsics, T_base_cam, depth)
     if known.body is not None:
         excess = misfit(known.body, newest, support_height)
-        if np.count_nonzero(excess < -settings.contradiction_px) > settings.moved_share * TANGENTS:
+        limit = max(settings.contradiction_px, settings.contradiction_m / (newest.pixel * depth))
+        if np.count_nonzero(excess < -limit) > settings.moved_share * TANGENTS:
             ray = T_base_cam[:3, :3] @ np.array([*fixation.centroid, 1.0])
-            return _moved(known, known.body, newest, ray, support_height, settings)
-        newest = replace(newest, normals=newest.normals[excess < settings.contradiction_px])
+            return _contradicted(known, known.body, newest, ray, support_height, settings)
+        short_from = _short_from(known, known.body, newest, excess >= limit, settings)
+        known = replace(known, contradictions=0, short_from=short_from)
+        if short_from is not None and _turned(known.body, newest, short_from) > settings.parted_turn:
+            return TargetBody((newest,))
+        newest = replace(newest, normals=newest.normals[excess < limit])
     if len(newest.normals) < TANGENTS / 2:
         doubts = known.doubts + 1
         return replace(known, doubts=doubts) if doubts < settings.doubts else TargetBody()
@@ -121,10 +140,30 @@ def with_outline(
     body = fit_upright_body(outlines, prior, support_height, settings.body, known.body)
     if body.half_sizes.max() > settings.largest_half_size_m:
         return TargetBody((newest,))
-    return TargetBody(outlines, body, known.prior)
+    return TargetBody(outlines, body, known.prior, short_from=known.short_from)
 
 
-def _moved(
+def _short_from(
+    known: TargetBody, body: UprightBody, newest: Outline, missing: MaskArray, settings: CentreSettings
+) -> FloatArray | None:
+    """Direction to the camera when part of the outline began to be missing; ``missing``: which tangents are now."""
+    if np.count_nonzero(missing) < settings.parted_share * TANGENTS:
+        return None
+    return _direction(body, newest) if known.short_from is None else known.short_from
+
+
+def _direction(body: UprightBody, outline: Outline) -> FloatArray:
+    """Unit vector from a body to the camera that saw the outline, shape (3,), in base."""
+    offset = outline.origin - body.centre
+    return offset / np.linalg.norm(offset)
+
+
+def _turned(body: UprightBody, newest: Outline, before: FloatArray) -> float:
+    """Angle by which the line of sight turned since its direction was ``before``, rad."""
+    return math.acos(float(np.clip(_direction(body, newest) @ before, -1.0, 1.0)))
+
+
+def _contradicted(
     known: TargetBody,
     body: UprightBody,
     newest: Outline,
@@ -132,7 +171,7 @@ def _moved(
     support_height: float,
     settings: CentreSettings,
 ) -> TargetBody:
-    """The same body elsewhere, if that fits; else all begins anew.
+    """After a frame that contradicts the body: one may be bad; after several it is elsewhere, or all begins again.
 
     Args:
         known: what outlines said before.
@@ -142,6 +181,8 @@ def _moved(
         support_height: height of the table in base, m.
         settings: how well it must fit.
     """
+    if known.contradictions + 1 < settings.moved_frames:
+        return replace(known, contradictions=known.contradictions + 1)
     if ray[2] > -1e-3 or newest.origin[2] < body.centre[2]:  # the ray does not come down to the table
         return TargetBody((newest,))
     point = newest.origin + ray * (body.centre[2] - newest.origin[2]) / ray[2]

@@ -167,7 +167,7 @@ def test_a_target_passed_by_the_camera_has_a_finite_positive_distance():
 def test_an_estimate_that_runs_far_off_begins_again_and_hears_what_comes_near():
     far, near = np.array([1e5, 0.0, 0.0]), np.array([0.6, 0.0, 0.0])
     state = None
-    for state, pose, _, _ in follow(lambda t: circle(t, 1e5), lambda t: far, 200):  # noqa: B007
+    for state, pose, _, _ in follow(lambda t: circle(t, 1e5), lambda t: far, 200):
         depth, std, _ = distance_at(state, pose, SETTINGS)
         assert depth <= 1.2 * SETTINGS.farthest_m
     assert std > 0.3 * depth

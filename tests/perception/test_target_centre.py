@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_upright_body import CAMERA, TABLE, approach, mask_of, surface
 
+from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.perception.distance_filters import Fixation
 from fixation_gym.perception.segmentation import Segmentation
 from fixation_gym.perception.target_centre import CentreSettings, TargetBody, with_outline
@@ -49,11 +50,12 @@ def test_outlines_are_kept_from_new_places_only():
     assert len(known.outlines) == 1
 
 
-def test_a_pushed_body_is_found_at_its_new_place_at_once_and_keeps_its_size():
+def test_a_pushed_body_is_found_at_its_new_place_soon_and_keeps_its_size():
     poses = approach(CENTRE)
     known = followed(TargetBody(), CENTRE, poses[:8])
     moved = CENTRE + np.array([0.05, 0.02, 0.0])
-    for pose in poses[8:]:
+    known = followed(known, moved, poses[8 : 8 + SETTINGS.moved_frames - 1])
+    for pose in poses[8 + SETTINGS.moved_frames - 1 :]:
         known = followed(known, moved, [pose])
         body = known.believed(pose, SETTINGS)
         assert body is not None
@@ -61,14 +63,50 @@ def test_a_pushed_body_is_found_at_its_new_place_at_once_and_keeps_its_size():
         np.testing.assert_allclose(body.half_sizes[2], HALF_SIZES[2], atol=0.003)
 
 
-@pytest.mark.parametrize("side", [slice(None, 160), slice(160, None)])
+def test_a_single_bad_frame_costs_no_outline():
+    poses = approach(CENTRE)
+    known = followed(TargetBody(), CENTRE, poses[:8])
+    seen, fixation = sight(CENTRE, poses[8])
+    bad = np.zeros_like(seen.mask)
+    bad[20:200, 20:300] = True
+    for _ in range(SETTINGS.moved_frames - 1):
+        after = with_outline(known, replace(seen, mask=bad), fixation, CAMERA, poses[8], TABLE, SETTINGS)
+        assert after.outlines == known.outlines
+        assert after.body is known.body
+    assert followed(after, CENTRE, poses[8:]).contradictions == 0
+
+
+def test_two_things_that_touched_and_parted_are_no_longer_one_body():
+    poses = [pose for _ in range(3) for pose in approach(CENTRE)]
+    known = TargetBody()
+    small, other = (0.018, 0.018, 0.02), np.array([0.036, 0.011, 0.0])
+    centre = np.array([0.5, -0.1, TABLE + small[2]])
+    for index, pose in enumerate(poses):
+        mask = mask_of(surface("box", small, 0.3, centre), pose)
+        if index < 12:
+            mask = mask | mask_of(surface("box", small, 0.3, centre + other), pose)
+        seen, fixation = sight(centre, pose)
+        known = with_outline(known, replace(seen, mask=mask), fixation, CAMERA, pose, TABLE, SETTINGS)
+        if index == 11:
+            assert known.body is not None
+            assert known.body.half_sizes.max() > 0.03
+    assert known.body is not None
+    assert np.linalg.norm(known.body.centre - centre) < 0.002
+    np.testing.assert_allclose(known.body.half_sizes, small, atol=0.003)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_body_that_is_covered_from_one_side_stays_where_it_is(side):
     poses = approach(CENTRE)
     known = followed(TargetBody(), CENTRE, poses[:8])
+    edge = CENTRE + 0.06 * (poses[10][:3, 3] - CENTRE) / np.linalg.norm(
+        poses[10][:3, 3] - CENTRE
+    )  # of a board in front
     for pose in poses[8:]:
         seen, fixation = sight(CENTRE, pose)
         mask = seen.mask.copy()
-        mask[:, side] = False
+        columns = np.arange(mask.shape[1])
+        mask[:, side * (columns - CAMERA.project(transform(inverse(pose), edge))[0]) > 0.0] = False
         known = with_outline(known, replace(seen, mask=mask), fixation, CAMERA, pose, TABLE, SETTINGS)
         body = known.believed(pose, SETTINGS)
         assert body is not None
@@ -137,3 +175,16 @@ def test_number_of_outlines_is_bounded_and_the_newest_is_kept():
         known = with_outline(known, *sight(CENTRE, pose), CAMERA, pose, TABLE, few)
         assert len(known.outlines) <= 12
         np.testing.assert_array_equal(known.outlines[-1].origin, pose[:3, 3])
+
+
+@pytest.mark.parametrize("distance", [0.1, 0.4])
+def test_a_shape_that_is_not_quite_of_the_fitted_kind_contradicts_no_body_close_by(distance):
+    poses = approach(CENTRE)
+    known = followed(TargetBody(), CENTRE, poses)
+    pose = poses[-1].copy()
+    pose[:3, 3] = CENTRE - distance * pose[:3, 2]
+    swollen = tuple(size + 0.001 for size in HALF_SIZES)
+    mask = mask_of(surface("box", swollen, 0.3, CENTRE), pose)
+    seen, fixation = sight(CENTRE, pose)
+    after = with_outline(known, replace(seen, mask=mask), fixation, CAMERA, pose, TABLE, SETTINGS)
+    assert after.contradictions == 0
