@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from statistics import NormalDist
 
 import numpy as np
 
@@ -28,14 +27,11 @@ def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[f
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
     if n == 0:
         return 0.0, 1.0
-    z = NormalDist().inv_cdf(0.5 + confidence / 2.0)
-    rate = successes / n
-    centre = (rate + z * z / (2 * n)) / (1 + z * z / n)
-    half_width = z * math.sqrt(rate * (1 - rate) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    from scipy.stats import binomtest  # a second to import
+
+    interval = binomtest(successes, n).proportion_ci(confidence, method="wilson")
     # Rounding must not exclude the observed rate at its limits.
-    low = 0.0 if successes == 0 else max(0.0, centre - half_width)
-    high = 1.0 if successes == n else min(1.0, centre + half_width)
-    return low, high
+    return min(float(interval.low), successes / n), max(float(interval.high), successes / n)
 
 
 def mcnemar_p(first_only: int, second_only: int) -> float:
@@ -45,9 +41,11 @@ def mcnemar_p(first_only: int, second_only: int) -> float:
         first_only: pairs in which only the first succeeded.
         second_only: pairs in which only the second succeeded.
     """
-    n, k = first_only + second_only, min(first_only, second_only)
-    tail = sum(math.comb(n, i) for i in range(k + 1)) / 2**n
-    return min(1.0, 2.0 * tail)
+    if first_only + second_only == 0:
+        return 1.0
+    from scipy.stats import binomtest  # a second to import
+
+    return float(binomtest(first_only, first_only + second_only).pvalue)
 
 
 def paired_difference_interval(

@@ -115,15 +115,15 @@ def with_outline(
         return known
     depth = fixation.distance_m if known.body is None else max(known.body.depth(T_base_cam)[0], MIN_DEPTH_M)
     newest = outline_of(seen.mask, intrinsics, T_base_cam, depth)
-    if known.body is not None:
-        excess = misfit(known.body, newest, support_height)
+    if (expected := known.body) is not None:
+        excess = misfit(expected, newest, support_height)
         limit = max(settings.contradiction_px, settings.contradiction_m / (newest.pixel * depth))
         if np.count_nonzero(excess < -limit) > settings.moved_share * TANGENTS:
             ray = T_base_cam[:3, :3] @ np.array([*fixation.centroid, 1.0])
-            return _contradicted(known, known.body, newest, ray, support_height, settings)
-        short_from = _short_from(known, known.body, newest, excess >= limit, settings)
+            return _contradicted(known, expected, newest, ray, support_height, settings)
+        short_from = _short_from(known, expected, newest, excess >= limit, settings)
         known = replace(known, contradictions=0, short_from=short_from)
-        if short_from is not None and _turned(known.body, newest, short_from) > settings.parted_turn:
+        if short_from is not None and _turned(expected, newest, short_from) > settings.parted_turn:
             return TargetBody((newest,))
         newest = replace(newest, normals=newest.normals[excess < limit])
     if len(newest.normals) < TANGENTS / 2:
