@@ -110,3 +110,34 @@ def test_help_loads_neither_simulator_nor_torch(watched):
 
 def test_modules_import_without_simulator_and_torch(watched):
     assert watched["modules"] == []
+
+
+ON_A_ROBOT = """
+import sys
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("gymnasium", "mujoco", "robosuite", "torch", "stable_baselines3"):
+            raise ModuleNotFoundError(name, name=name)
+
+sys.meta_path.insert(0, Absent())
+import importlib.util
+real = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == "gymnasium" else real(name, *rest)
+import numpy as np
+import fixation_gym.control.servo_laws
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception import Perception
+from policies.servo.servo_policy import ServoPolicy
+camera = Intrinsics.from_fovy(96, 128, 0.7)
+policy = ServoPolicy(Perception(camera))
+obs = {"rgb": np.zeros((96, 128, 3), np.uint8), "time": [0.0], "gripper_width": [0.08], "joint_pos": np.zeros(7),
+       "joint_vel": np.zeros(7), "camera_pose": [0.4, 0, 0.5, 0, 1, 0, 0], "camera_twist": np.zeros(6)}
+print(policy.act(obs).shape)
+"""
+
+
+def test_perception_and_servo_run_without_gymnasium_and_simulator():
+    result = subprocess.run([sys.executable, "-c", ON_A_ROBOT], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.strip() == "(7,)"

@@ -26,8 +26,8 @@ class Percept:
     """Zero-flow test at the previous frame: what is nearer than the fixated object."""
     fixation: Fixation
     """Where the fixated object is now."""
-    T_base_cam: FloatArray
-    """Camera pose in base at the time of ``flow`` and ``zfc``, shape (4, 4)."""
+    T_base_flow: FloatArray
+    """Camera pose in base at the time of ``flow`` and ``zfc``, one frame ago, shape (4, 4)."""
     body: UprightBody | None = None
     """The body whose surface is fixated; None while its centre is not sure."""
 

@@ -135,7 +135,7 @@ class ServoPolicy:
                 self._memory,
                 percept.zfc,
                 percept.flow.intrinsics,
-                percept.T_base_cam,
+                percept.T_base_flow,
                 percept.flow.time,
                 self._memory_settings,
                 self._perception.support_height_m,

@@ -55,7 +55,7 @@ class WaySearch:
             self._seen = SeenSpace.empty(math.atan2(target[1], target[0]))
         places = self._seen.places(target)
         self._seen = self._seen.with_seen(
-            seen_places(places, percept.zfc, percept.flow.intrinsics, percept.T_base_cam, _HIDING)
+            seen_places(places, percept.zfc, percept.flow.intrinsics, percept.T_base_flow, _HIDING)
         )
 
     def choose(

@@ -86,7 +86,7 @@ def test_the_memory_keeps_points_in_front_of_the_target_only():
         percept = perception.update(observation)
         if k > 8:
             time, grid = percept.flow.time, percept.flow.intrinsics
-            memory = remember(memory, percept.zfc, grid, percept.T_base_cam, time, settings)
+            memory = remember(memory, percept.zfc, grid, percept.T_base_flow, time, settings)
     points, _ = believed_points(memory, settings)
     assert len(points) > 10
     pixels = np.rint(CAMERA.project(transform(inverse(pose), points))).astype(int)

@@ -104,7 +104,7 @@ def calls(look: Look) -> dict[Rule, MaskArray]:
     with np.errstate(invalid="ignore"):
         exact = zfc.inverse_depth > zfc.fixated_inverse_depth
     return {
-        "plane": plane_front(percept.T_base_cam, percept.flow.intrinsics, TABLE_HEIGHT, zfc.fixated_inverse_depth),
+        "plane": plane_front(percept.T_base_flow, percept.flow.intrinsics, TABLE_HEIGHT, zfc.fixated_inverse_depth),
         "behind": np.zeros_like(exact),
         "paper": dot_product_front(percept.flow, look.twist),
         "exact": exact,

@@ -153,11 +153,12 @@ def run_clear(rig: ScenarioRig, variant: str, rng: np.random.Generator) -> dict[
         # The servo remembers under the same condition.
         if float(np.linalg.norm(percept.fixation.centroid)) < gains.grasp_centred:
             memory = remember(
-                memory, percept.zfc, percept.flow.intrinsics, percept.T_base_cam, percept.flow.time, settings
+                memory, percept.zfc, percept.flow.intrinsics, percept.T_base_flow, percept.flow.time, settings
             )
         points, evidence = believed_points(memory, settings)
-        in_camera = transform(inverse(percept.T_base_cam), points)
-        term = obstacle_term(in_camera, evidence, percept.fixation.distance_m, TOOL_IN_CAMERA[2], gains.obstacle_margin)
+        to_camera = inverse(percept.T_base_flow)
+        in_camera, depth = transform(to_camera, points), float(transform(to_camera, percept.fixation.point_base)[2])
+        term = obstacle_term(in_camera, evidence, depth, TOOL_IN_CAMERA[2], gains.obstacle_margin)
         now = {"map": bool((cells > _FRONT_CELL).any()), "path": term.evidence > gains.obstacle_evidence}
         alarms.update(name for name in now if now[name] and not before[name])
         before = now
