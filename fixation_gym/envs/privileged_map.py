@@ -13,7 +13,7 @@ import numpy as np
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.envs.contacts import OBSTACLE, geom_owners
 from fixation_gym.envs.rendering import View
-from fixation_gym.perception.evidence_map import CELLS
+from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.types import FloatArray, ImageArray
 
 _AWAY = (0.0, 0.0, -100.0)

@@ -23,7 +23,7 @@ from fixation_gym.envs.zfc_observation import (
     zfc_observation_space,
 )
 from fixation_gym.geometry.rigid import pose_to_matrix
-from fixation_gym.perception.grasp_axis import narrow_axis
+from fixation_gym.perception.body.grasp_axis import narrow_axis
 from fixation_gym.perception.percept import Percept
 from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
 from fixation_gym.types import FloatArray, Observation

@@ -9,8 +9,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fixation_gym.control.open_loop import Stage
-from fixation_gym.perception.distance_filters import Fixation
-from fixation_gym.perception.evidence_map import CELLS
+from fixation_gym.perception.distance.pose_filter import Fixation
+from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.types import FloatArray, Observation
 
 OBSERVATIONS = ("zfc", "blind", "rgb", "privileged")

@@ -1,13 +1,13 @@
 """From images and camera poses to the fixated distance and the zero-flow map: NumPy, SciPy, OpenCV."""
 
-from fixation_gym.perception.distance_filters import DistanceSettings, Fixation
+from fixation_gym.perception.detection.segmentation import RED, Colour, Segmentation, segment
+from fixation_gym.perception.distance.pose_filter import DistanceSettings, Fixation
 from fixation_gym.perception.drawing import draw_overlay
-from fixation_gym.perception.optic_flow import Flow, FlowSettings
+from fixation_gym.perception.flow.optic_flow import Flow, FlowSettings
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.perception.segmentation import RED, Colour, Segmentation, segment
 from fixation_gym.perception.settings import PerceptionSettings
-from fixation_gym.perception.zero_flow import ZeroFlow, ZeroFlowSettings, obstacle_centre
+from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow, ZeroFlowSettings, obstacle_centre
 
 __all__ = [
     "RED",

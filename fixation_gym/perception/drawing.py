@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from fixation_gym.perception.distance_filters import Fixation
+from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.percept import Percept
-from fixation_gym.perception.zero_flow import UNKNOWN, obstacle_centre
+from fixation_gym.perception.zero_flow.zero_flow import UNKNOWN, obstacle_centre
 from fixation_gym.types import FloatArray, ImageArray
 
 FRONT_RGB = (255, 140, 0)

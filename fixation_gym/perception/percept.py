@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fixation_gym.perception.distance_filters import Fixation
-from fixation_gym.perception.optic_flow import Flow
-from fixation_gym.perception.segmentation import Segmentation
-from fixation_gym.perception.upright_body import UprightBody
-from fixation_gym.perception.zero_flow import ZeroFlow
+from fixation_gym.perception.body.upright_body import UprightBody
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.distance.pose_filter import Fixation
+from fixation_gym.perception.flow.optic_flow import Flow
+from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow
 from fixation_gym.types import FloatArray
 
 

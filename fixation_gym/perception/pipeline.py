@@ -11,14 +11,19 @@ import numpy as np
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
-from fixation_gym.perception import distance_filters as distance
-from fixation_gym.perception import kernels
-from fixation_gym.perception.distance_filters import DistanceState, Fixation
-from fixation_gym.perception.fixation_constraint import ConstrainedGaze
-from fixation_gym.perception.following import Frame, follow_constraint, follow_poses, mean_variance, mended
-from fixation_gym.perception.gradients import FlowSettings
-from fixation_gym.perception.opencv_tracking import Window, expected_in, shifted, window_around
-from fixation_gym.perception.optic_flow import (
+from fixation_gym.perception.body.target_centre import TargetBody, with_outline
+from fixation_gym.perception.body.upright_body import UprightBody
+from fixation_gym.perception.detection.mean_shift import Window, expected_in, shifted, window_around
+from fixation_gym.perception.detection.segmentation import Segmentation, coloured_pixels, segment
+from fixation_gym.perception.detection.tracking import Expectation, Track, expected_at, followed
+from fixation_gym.perception.distance import pose_filter as distance
+from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze
+from fixation_gym.perception.distance.following import Frame, follow_constraint, follow_poses, mean_variance, mended
+from fixation_gym.perception.distance.pose_filter import DistanceState, Fixation
+from fixation_gym.perception.distance.target_motion import InverseDepth, contradiction, target_inverse_depth
+from fixation_gym.perception.flow import kernels
+from fixation_gym.perception.flow.gradients import FlowSettings
+from fixation_gym.perception.flow.optic_flow import (
     Flow,
     estimate_flow,
     flow_grid,
@@ -28,13 +33,8 @@ from fixation_gym.perception.optic_flow import (
 )
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.scratch import Scratch
-from fixation_gym.perception.segmentation import Segmentation, coloured_pixels, segment
 from fixation_gym.perception.settings import PerceptionSettings
-from fixation_gym.perception.target_centre import TargetBody, with_outline
-from fixation_gym.perception.target_motion import InverseDepth, contradiction, target_inverse_depth
-from fixation_gym.perception.tracking import Expectation, Track, expected_at, followed
-from fixation_gym.perception.upright_body import UprightBody
-from fixation_gym.perception.zero_flow import (
+from fixation_gym.perception.zero_flow.zero_flow import (
     Gaze,
     ZeroFlow,
     ZeroFlowSettings,

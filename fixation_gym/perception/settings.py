@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fixation_gym.perception.distance_filters import DistanceSettings
-from fixation_gym.perception.fixation_constraint import ConstraintSettings
-from fixation_gym.perception.gradients import FlowSettings
-from fixation_gym.perception.segmentation import RED, Colour
-from fixation_gym.perception.target_centre import CentreSettings
-from fixation_gym.perception.tracking import TrackingSettings
-from fixation_gym.perception.zero_flow import ZeroFlowSettings
+from fixation_gym.perception.body.target_centre import CentreSettings
+from fixation_gym.perception.detection.segmentation import RED, Colour
+from fixation_gym.perception.detection.tracking import TrackingSettings
+from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
+from fixation_gym.perception.distance.pose_filter import DistanceSettings
+from fixation_gym.perception.flow.gradients import FlowSettings
+from fixation_gym.perception.zero_flow.zero_flow import ZeroFlowSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fixation_gym.perception.evidence_map import CELLS
+from fixation_gym.perception.zero_flow.evidence_map import CELLS
 
 VIEWS: dict[str, str | None] = {"zfc": "zfc_map", "blind": None, "rgb": "rgb", "privileged": "true_map"}
 """Key of the view in the observation, by the observation's name."""

@@ -16,7 +16,7 @@ from fixation_gym.control.open_loop import Stage
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.zfc_observation import fixation_vector, proprio_vector, zfc_observation_space
 from fixation_gym.geometry.rigid import pose_to_matrix
-from fixation_gym.perception.distance_filters import Fixation
+from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.percept import Percept
 from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
 from fixation_gym.types import Command, FloatArray, Observation

@@ -14,15 +14,15 @@ from fixation_gym.control.obstacle_term import ObstacleTerm, obstacle_term
 from fixation_gym.control.open_loop import Manoeuvre, Stage, Target
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix, transform
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.perception.grasp_axis import narrow_axis
-from fixation_gym.perception.obstacle_memory import (
+from fixation_gym.perception.body.grasp_axis import narrow_axis
+from fixation_gym.perception.percept import Percept
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.perception.zero_flow.obstacle_memory import (
     MemorySettings,
     ObstacleMemory,
     believed_points,
     remember,
 )
-from fixation_gym.perception.percept import Percept
-from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
 from fixation_gym.types import Command, FloatArray, Observation
 from policies.base import Action, Estimate

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 from fixation_gym.control.gaze import GazeGains
 from fixation_gym.control.ways import WayCosts
-from fixation_gym.perception.evidence_map import ZeroFlowSettings
-from fixation_gym.perception.fixation_constraint import ConstraintSettings
-from fixation_gym.perception.obstacle_memory import MemorySettings
+from fixation_gym.perception.detection.tracking import TrackingSettings
+from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.settings import PerceptionSettings
-from fixation_gym.perception.tracking import TrackingSettings
+from fixation_gym.perception.zero_flow.evidence_map import ZeroFlowSettings
+from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings
 from policies.servo.gains import ServoGains
 
 

@@ -14,8 +14,8 @@ from fixation_gym.control.ways import (
     lateral_direction,
     way_costs,
 )
-from fixation_gym.perception.obstacle_memory import seen_places
 from fixation_gym.perception.percept import Percept
+from fixation_gym.perception.zero_flow.obstacle_memory import seen_places
 from fixation_gym.types import FloatArray
 from policies.servo.gains import ServoGains
 

@@ -27,7 +27,7 @@ from fixation_gym.experiments.scenarios.statistics import bootstrap_ratio, forma
 from fixation_gym.experiments.scenarios.view import MARGIN, SceneView
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, look_at, transform
-from fixation_gym.perception.region_vote import VoteSettings
+from fixation_gym.perception.zero_flow.region_vote import VoteSettings
 
 
 def view_of(instance: Instance) -> SceneView:

@@ -5,7 +5,7 @@ import pytest
 from test_upright_body import CAMERA, TABLE, approach, mask_of, surface
 
 from fixation_gym.geometry.rigid import matrix_to_pose
-from fixation_gym.perception.fixation_constraint import ConstraintSettings
+from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.types import Observation

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import exp_twist, mean_twist
-from fixation_gym.perception.calibrating_filter import (
+from fixation_gym.perception.distance.calibrating_filter import (
     CalibratingSettings,
     Sighting,
     advance,

@@ -5,8 +5,9 @@ import pytest
 from pinhole_scene import Scene, noise_texture, upright
 from test_pipeline_and_zero_flow import CAMERA, RED, TARGET, circling, frames
 
-from fixation_gym.perception import Perception, following, pipeline, segment
-from fixation_gym.perception.covering import slide
+from fixation_gym.perception import Perception, pipeline, segment
+from fixation_gym.perception.distance import following
+from fixation_gym.perception.distance.covering import slide
 
 
 def red_box(left, right, top=60, bottom=100):

@@ -6,7 +6,7 @@ from pinhole_scene import fixating_pose
 
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import skew
-from fixation_gym.perception.distance_filters import (
+from fixation_gym.perception.distance.pose_filter import (
     DistanceSettings,
     distance_at,
     fixation_at,

@@ -20,10 +20,11 @@ from test_pipeline_and_zero_flow import (
 
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import mean_twist
-from fixation_gym.perception import Perception, PerceptionSettings, ZeroFlowSettings, kernels
-from fixation_gym.perception.dot_product_rule import dot_product_front, rule_answers
-from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
-from fixation_gym.perception.pixel_test import PixelAnswers
+from fixation_gym.perception import Perception, PerceptionSettings, ZeroFlowSettings
+from fixation_gym.perception.flow import kernels
+from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front, rule_answers
+from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
+from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers
 
 RULE = PerceptionSettings(zero_flow=ZeroFlowSettings(rule="dot_product"))
 MARGIN = RULE.zero_flow.depth_margin

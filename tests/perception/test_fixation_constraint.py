@@ -10,7 +10,7 @@ from pinhole_scene import Scene, fixating_pose, noise_texture, observe, upright
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import Perception, PerceptionSettings
-from fixation_gym.perception.fixation_constraint import ConstraintSettings, advance, gaze_drift
+from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings, advance, gaze_drift
 
 CAMERA = Intrinsics.from_fovy(96, 128, np.deg2rad(42.5))
 TARGET = np.array([0.35, 0.0, 0.0])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.flat_target import coverage, flat_centroid
+from fixation_gym.perception.distance.flat_target import coverage, flat_centroid
 
 CAMERA = Intrinsics.from_fovy(120, 160, 0.74)
 RED, CARD = np.array([200.0, 16.0, 14.0]), np.array([225.0, 225.0, 222.0])

@@ -10,8 +10,8 @@ from pinhole_scene import fixating_pose
 from fixation_gym.geometry.interaction import image_flow
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import mean_twist
-from fixation_gym.perception import flow_distance_filters as filters
-from fixation_gym.perception.flow_distance_filters import (
+from fixation_gym.perception.distance import flow_filters as filters
+from fixation_gym.perception.distance.flow_filters import (
     FlowFilterSettings,
     FlowSamples,
     distance_of,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.flow_samples import FLOW_NAMES, SAMPLE_COUNT, CutOut, sample_flow
+from fixation_gym.perception.distance.flow_samples import FLOW_NAMES, SAMPLE_COUNT, CutOut, sample_flow
 
 CAMERA = Intrinsics.from_fovy(480, 640, np.radians(42.5))
 DT = 0.04

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fixation_gym.perception.grasp_axis import narrow_axis
+from fixation_gym.perception.body.grasp_axis import narrow_axis
 
 MAX_ROLL = np.radians(50.0)
 

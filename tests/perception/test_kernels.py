@@ -12,10 +12,13 @@ from pinhole_scene import Rectangle, Scene, fixating_pose, noise_texture, observ
 from scipy.special import ndtr
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception import Colour, Perception, gradients, kernels, segmentation, zero_flow
-from fixation_gym.perception.evidence_map import evidence_map
-from fixation_gym.perception.pixel_test import normal_distribution
-from fixation_gym.perception.zero_flow import ZeroFlowSettings
+from fixation_gym.perception import Colour, Perception
+from fixation_gym.perception.detection import segmentation
+from fixation_gym.perception.flow import gradients, kernels
+from fixation_gym.perception.zero_flow import zero_flow
+from fixation_gym.perception.zero_flow.evidence_map import evidence_map
+from fixation_gym.perception.zero_flow.pixel_answers import normal_distribution
+from fixation_gym.perception.zero_flow.zero_flow import ZeroFlowSettings
 
 FOVY = np.deg2rad(42.5)
 needs_numba = pytest.mark.skipif(not kernels.enabled, reason="numba is not installed")

@@ -5,8 +5,8 @@ import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
-from fixation_gym.perception.zero_flow import ZeroFlow, unknown_zero_flow
+from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
+from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow, unknown_zero_flow
 
 CAMERA = Intrinsics.from_fovy(40, 60, 0.74)
 SETTINGS = MemorySettings()

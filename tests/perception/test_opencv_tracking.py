@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.opencv_tracking import Window, expected_in, shifted
-from fixation_gym.perception.tracking import FIRST_LOOK, NOWHERE, TrackingSettings
+from fixation_gym.perception.detection.mean_shift import Window, expected_in, shifted
+from fixation_gym.perception.detection.tracking import FIRST_LOOK, NOWHERE, TrackingSettings
 
 CAMERA = Intrinsics.from_fovy(120, 160, math.radians(60.0))
 SETTINGS = TrackingSettings()

@@ -7,8 +7,8 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import image_flow
 from fixation_gym.geometry.rigid import inverse
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.perception import gradients, kernels
-from fixation_gym.perception.optic_flow import estimate_flow, flow_grid, invalid_flow, plane_homography
+from fixation_gym.perception.flow import gradients, kernels
+from fixation_gym.perception.flow.optic_flow import estimate_flow, flow_grid, invalid_flow, plane_homography
 
 CAMERA = Intrinsics.from_fovy(120, 160, np.deg2rad(42.5))
 TIMES = (0.0, 0.04, 0.08)

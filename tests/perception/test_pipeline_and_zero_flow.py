@@ -10,7 +10,7 @@ from pinhole_scene import Rectangle, Scene, fixating_pose, noise_texture, observ
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception import Perception, draw_overlay, obstacle_centre
 from fixation_gym.perception.drawing import distance_text
-from fixation_gym.perception.zero_flow import CELLS, UNKNOWN
+from fixation_gym.perception.zero_flow.zero_flow import CELLS, UNKNOWN
 
 CAMERA = Intrinsics.from_fovy(160, 214, np.deg2rad(42.5))
 RED = (0.85, 0.08, 0.08)

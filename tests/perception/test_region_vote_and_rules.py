@@ -12,10 +12,10 @@ from test_pipeline_and_zero_flow import CAMERA, POSTERS, TARGET, circling, frame
 from fixation_gym.geometry.interaction import fixation_coupling, image_flow
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import pipeline
-from fixation_gym.perception.dot_product_rule import dot_product_front
-from fixation_gym.perception.region_vote import Side, VoteSettings, decide, region_votes
-from fixation_gym.perception.target_motion import contradiction, target_inverse_depth
-from fixation_gym.perception.zero_flow import Gaze, ZeroFlowSettings, zero_flow_test
+from fixation_gym.perception.distance.target_motion import contradiction, target_inverse_depth
+from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front
+from fixation_gym.perception.zero_flow.region_vote import Side, VoteSettings, decide, region_votes
+from fixation_gym.perception.zero_flow.zero_flow import Gaze, ZeroFlowSettings, zero_flow_test
 
 
 @pytest.mark.parametrize("v_z", [0.0, 0.05])

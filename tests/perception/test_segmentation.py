@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.segmentation import segment
+from fixation_gym.perception.detection.segmentation import segment
 
 CAMERA = Intrinsics.from_fovy(240, 320, np.deg2rad(42.5))
 RED = (190, 25, 20)

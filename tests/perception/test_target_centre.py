@@ -9,9 +9,9 @@ import pytest
 from test_upright_body import CAMERA, TABLE, approach, mask_of, surface
 
 from fixation_gym.geometry.rigid import inverse, transform
-from fixation_gym.perception.distance_filters import Fixation
-from fixation_gym.perception.segmentation import Segmentation
-from fixation_gym.perception.target_centre import CentreSettings, TargetBody, with_outline
+from fixation_gym.perception.body.target_centre import CentreSettings, TargetBody, with_outline
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.distance.pose_filter import Fixation
 
 SETTINGS = CentreSettings()
 HALF_SIZES = (0.025, 0.025, 0.035)

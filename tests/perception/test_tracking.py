@@ -7,8 +7,8 @@ import pytest
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, transform
 from fixation_gym.perception import Perception
-from fixation_gym.perception.segmentation import segment
-from fixation_gym.perception.tracking import TrackingSettings, expected_at, followed
+from fixation_gym.perception.detection.segmentation import segment
+from fixation_gym.perception.detection.tracking import TrackingSettings, expected_at, followed
 from fixation_gym.types import Observation
 
 CAMERA = Intrinsics.from_fovy(120, 160, np.deg2rad(42.5))

@@ -8,7 +8,7 @@ import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.perception.upright_body import (
+from fixation_gym.perception.body.upright_body import (
     TANGENTS,
     BodySettings,
     UprightBody,

@@ -11,14 +11,14 @@ from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
-from fixation_gym.perception import distance_filters as distance
-from fixation_gym.perception.optic_flow import estimate_flow, plane_homography, prepare_grey
+from fixation_gym.perception.detection.segmentation import segment
+from fixation_gym.perception.distance import pose_filter as distance
+from fixation_gym.perception.flow.optic_flow import estimate_flow, plane_homography, prepare_grey
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.scratch import Scratch
-from fixation_gym.perception.segmentation import segment
 from fixation_gym.perception.settings import PerceptionSettings
-from fixation_gym.perception.zero_flow import Gaze, zero_flow_test
+from fixation_gym.perception.zero_flow.zero_flow import Gaze, zero_flow_test
 from fixation_gym.types import FloatArray, ImageArray, Observation
 
 _SETTINGS = PerceptionSettings()

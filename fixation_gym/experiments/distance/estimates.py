@@ -12,11 +12,13 @@ from fixation_gym.envs.config import SensorNoise
 from fixation_gym.experiments.distance.recording import Frame, Recording, filter_settings, pose_estimate
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, CYCLE_RATE, INTRINSICS
 from fixation_gym.geometry.twist import skew
-from fixation_gym.perception import calibrating_filter, distance_filters, flow_distance_filters
-from fixation_gym.perception.distance_filters import DistanceSettings
-from fixation_gym.perception.fixation_constraint import gaze_drift
-from fixation_gym.perception.flow_distance_filters import FlowFilterSettings, Kind
-from fixation_gym.perception.flow_samples import FLOW_NAMES, FlowName
+from fixation_gym.perception.distance import calibrating_filter
+from fixation_gym.perception.distance import flow_filters as flow_distance_filters
+from fixation_gym.perception.distance import pose_filter as distance_filters
+from fixation_gym.perception.distance.fixation_constraint import gaze_drift
+from fixation_gym.perception.distance.flow_filters import FlowFilterSettings, Kind
+from fixation_gym.perception.distance.flow_samples import FLOW_NAMES, FlowName
+from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.types import FloatArray
 
 ONSET_TOLERANCE, JUMP_TOLERANCE = 0.03, 0.05

@@ -30,12 +30,12 @@ from fixation_gym.experiments.distance.sequence import (
 )
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.perception import calibrating_filter
-from fixation_gym.perception.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
-from fixation_gym.perception.flat_target import coverage, flat_centroid
-from fixation_gym.perception.flow_distance_filters import FlowSamples
-from fixation_gym.perception.flow_samples import CutOut, FlowName, sample_flow
-from fixation_gym.perception.segmentation import segment
+from fixation_gym.perception.detection.segmentation import segment
+from fixation_gym.perception.distance import calibrating_filter
+from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
+from fixation_gym.perception.distance.flat_target import coverage, flat_centroid
+from fixation_gym.perception.distance.flow_filters import FlowSamples
+from fixation_gym.perception.distance.flow_samples import CutOut, FlowName, sample_flow
 from fixation_gym.robot import TWIST_LIMITS
 from fixation_gym.types import FloatArray, ImageArray
 

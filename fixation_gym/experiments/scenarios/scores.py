@@ -19,8 +19,8 @@ from fixation_gym.envs.truth_view import Truth
 from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
 from fixation_gym.experiments.scenarios.rules import Rule, plane_front
 from fixation_gym.experiments.scenarios.scenes import Instance
-from fixation_gym.perception.dot_product_rule import dot_product_front
-from fixation_gym.perception.region_vote import VoteSettings, region_votes
+from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front
+from fixation_gym.perception.zero_flow.region_vote import VoteSettings, region_votes
 from fixation_gym.types import FloatArray, MaskArray
 
 PLACES = ("obstacle", "table", "room")

@@ -22,9 +22,9 @@ from fixation_gym.experiments.scenarios.scores import (
     votes,
 )
 from fixation_gym.geometry.rigid import inverse, transform
-from fixation_gym.perception.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
-from fixation_gym.perception.region_vote import Side, VoteSettings, decide
-from fixation_gym.perception.zero_flow import UNKNOWN
+from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
+from fixation_gym.perception.zero_flow.region_vote import Side, VoteSettings, decide
+from fixation_gym.perception.zero_flow.zero_flow import UNKNOWN
 from fixation_gym.robot import TOOL_IN_CAMERA
 from policies.servo.gains import ServoGains
 

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fixation_gym.perception import kernels, pixel_kernels
-from fixation_gym.perception.optic_flow import Flow
+from fixation_gym.perception.flow import kernels
+from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.scratch import Float32Array, fill
+from fixation_gym.perception.zero_flow import pixel_kernels
 from fixation_gym.types import MaskArray
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, transform
-from fixation_gym.perception.zero_flow import ZeroFlow
+from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow
 from fixation_gym.types import FloatArray, MaskArray
 
 _NEIGHBOURHOOD = np.ones((5, 5), np.uint8)

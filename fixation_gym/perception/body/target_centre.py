@@ -8,10 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.distance_filters import Fixation
-from fixation_gym.perception.inverse_depth import MIN_DEPTH_M
-from fixation_gym.perception.segmentation import Segmentation
-from fixation_gym.perception.upright_body import (
+from fixation_gym.perception.body.upright_body import (
     TANGENTS,
     BodyPrior,
     BodySettings,
@@ -23,6 +20,9 @@ from fixation_gym.perception.upright_body import (
     outline_of,
     unknown_body,
 )
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.distance.inverse_depth import MIN_DEPTH_M
+from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.types import FloatArray, MaskArray
 
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from fixation_gym.perception import kernels
+from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.scratch import Float32Array, Scratch
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from fixation_gym.perception.segmentation import Segmentation
+from fixation_gym.perception.detection.segmentation import Segmentation
 
 _TURNING = 1.0
 """Relative change of area per radian by which the view turns: of a flat thing seen from 45 degrees above."""

@@ -20,11 +20,11 @@ import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import epipolar_direction
-from fixation_gym.perception.dot_product_rule import dot_product_front, rule_answers
-from fixation_gym.perception.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
-from fixation_gym.perception.optic_flow import Flow
-from fixation_gym.perception.pixel_test import PixelAnswers, PixelQuestion, pixel_answers
+from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.scratch import Float32Array, fill
+from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front, rule_answers
+from fixation_gym.perception.zero_flow.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
+from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQuestion, pixel_answers
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 _DECIDED = 0.95

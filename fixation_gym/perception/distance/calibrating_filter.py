@@ -1,6 +1,6 @@
 """Distance from camera poses and centroids when the camera's calibration is uncertain, too.
 
-As in ``distance_filters`` the unknowns are the target (alpha, beta, rho), seen from an anchor camera. Here they are
+As in ``pose_filter`` the unknowns are the target (alpha, beta, rho), seen from an anchor camera. Here they are
 joined by what stays wrong for a whole run: the hand-eye error (translation t, rotation vector r, in the camera frame)
 and the age tau of the image. Their priors come from the calibration; motion tells some of them. Left out, they make a
 filter sure and wrong.
@@ -20,7 +20,7 @@ import numpy as np
 
 from fixation_gym.geometry.rigid import cross
 from fixation_gym.geometry.twist import crosses, skews
-from fixation_gym.perception.inverse_depth import MIN_DEPTH_M, MIN_INVERSE_DEPTH
+from fixation_gym.perception.distance.inverse_depth import MIN_DEPTH_M, MIN_INVERSE_DEPTH
 from fixation_gym.types import FloatArray
 
 

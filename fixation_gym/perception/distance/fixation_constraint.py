@@ -1,7 +1,7 @@
 """Distance from the paper's hard fixation constraint alone: the measured ratio of rotation and translation.
 
 While the gaze is held, w_X = d v_Y and w_Y = -d v_X (Eqs. 2-3, with the signs of ``geometry.interaction``). This is the
-ablation of the pose filter (``distance_filters``) and uses the "hard" filter of ``flow_distance_filters``. It is given
+ablation of the pose filter (``pose_filter``) and uses the "hard" filter of ``flow_filters``. It is given
 no flow: at the fixation point the constraint makes the flow zero for any distance, so all of the distance comes from
 the twist. The centroid says nothing but where the ray to the target is and how fast the gaze drifts off.
 
@@ -15,9 +15,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fixation_gym.perception import distance_filters, flow_distance_filters
-from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState
-from fixation_gym.perception.flow_distance_filters import FlowFilterSettings, FlowFilterState
+from fixation_gym.perception.distance import flow_filters as flow_distance_filters
+from fixation_gym.perception.distance import pose_filter as distance_filters
+from fixation_gym.perception.distance.flow_filters import FlowFilterSettings, FlowFilterState
+from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState
 from fixation_gym.types import FloatArray
 
 

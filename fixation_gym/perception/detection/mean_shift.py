@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.segmentation import Segmentation
-from fixation_gym.perception.tracking import FIRST_LOOK, NOWHERE, Expectation, TrackingSettings
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.detection.tracking import FIRST_LOOK, NOWHERE, Expectation, TrackingSettings
 from fixation_gym.types import ImageArray
 
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 1.0)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fixation_gym.perception.inverse_depth import MIN_DEPTH_M, correction, product, projection, view_rows
+from fixation_gym.perception.distance.inverse_depth import MIN_DEPTH_M, correction, product, projection, view_rows
 from fixation_gym.types import FloatArray
 
 _REFERENCE_FOCAL_PX = 308.0

@@ -8,8 +8,9 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from fixation_gym.perception import kernels, pixel_kernels
+from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.scratch import Float32Array, fill
+from fixation_gym.perception.zero_flow import pixel_kernels
 from fixation_gym.types import ImageArray, MaskArray
 
 Rule = Literal["exact", "dot_product"]

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception import kernels, pixel_kernels
+from fixation_gym.perception.flow import kernels
+from fixation_gym.perception.zero_flow import pixel_kernels
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse
-from fixation_gym.perception.flow_distance_filters import FlowSamples
-from fixation_gym.perception.optic_flow import Flow, FlowSettings, estimate_flow, flow_grid, plane_homography
+from fixation_gym.perception.distance.flow_filters import FlowSamples
+from fixation_gym.perception.flow.optic_flow import Flow, FlowSettings, estimate_flow, flow_grid, plane_homography
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 FlowName = Literal["gradient", "warped", "dis"]

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fixation_gym.perception.optic_flow import Flow
-from fixation_gym.perception.pixel_test import PixelAnswers
+from fixation_gym.perception.flow.optic_flow import Flow
+from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers
 from fixation_gym.types import FloatArray, MaskArray
 
 

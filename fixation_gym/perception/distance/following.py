@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fixation_gym.geometry.rigid import cross, inverse, transform
-from fixation_gym.perception import distance_filters as distance
-from fixation_gym.perception import fixation_constraint
-from fixation_gym.perception.covering import slide
-from fixation_gym.perception.distance_filters import DistanceSettings, DistanceState
-from fixation_gym.perception.fixation_constraint import ConstrainedGaze, ConstraintSettings
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.distance import fixation_constraint
+from fixation_gym.perception.distance import pose_filter as distance
+from fixation_gym.perception.distance.covering import slide
+from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze, ConstraintSettings
+from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState
+from fixation_gym.perception.distance.target_motion import InverseDepth
 from fixation_gym.perception.scratch import Float32Array
-from fixation_gym.perception.segmentation import Segmentation
-from fixation_gym.perception.target_motion import InverseDepth
 from fixation_gym.types import FloatArray
 
 _COVERING = 0.05

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fixation_gym.perception.kernels import compiled
+from fixation_gym.perception.flow.kernels import compiled
 
 
 @compiled
 def test_pixels(information, gradient, cov, residual, usable, question, answers, supported, moving):
-    """Zero-flow test of every pixel: see ``pixel_test.pixel_answers`` for the meaning and ``PixelQuestion``.
+    """Zero-flow test of every pixel: see ``pixel_answers`` for the meaning and ``PixelQuestion``.
 
     Args:
         information: J of the flow, shape (3, h, w).

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.interaction import epipolar_direction
-from fixation_gym.perception.optic_flow import Flow
+from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.types import FloatArray, MaskArray
 
 InverseDepth = tuple[float, float]

@@ -12,7 +12,7 @@ from enum import Enum
 
 import numpy as np
 
-from fixation_gym.perception.zero_flow import ZeroFlow
+from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow
 from fixation_gym.types import MaskArray
 
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from fixation_gym.geometry.rigid import inverse, transform
-from fixation_gym.perception.segmentation import Segmentation
+from fixation_gym.perception.detection.segmentation import Segmentation
 from fixation_gym.types import FloatArray
 
 

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.gradients import (
+from fixation_gym.perception.flow.gradients import (
     SPACE_PREFILTER,
     TIME_DERIVATIVE,
     TIME_PREFILTER,

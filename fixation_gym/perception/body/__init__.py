@@ -1,0 +1,1 @@
+"""The target's body: its centre, its size, how to grasp it."""

@@ -1,0 +1,1 @@
+"""Where the target is in an image."""

@@ -1,0 +1,1 @@
+"""How far the fixated target is."""
