@@ -70,7 +70,11 @@ class Evaluate:
     """Evaluate a policy over scenarios and seeds. The same command again resumes a run that was killed."""
 
     policy: str = "servo"
-    """servo, blind, random, oracle, a variant of the servo, such as servo:no_retry, or the path of an agent's zip."""
+    """servo, blind, random, oracle, a variant of the servo, such as servo:no_retry, the path of an agent's zip, or
+    module:Class of your own."""
+    detector: str | None = None
+    """Finds the target for policies that look: colour, mean_shift, box (what the first box shows), or module:Class of
+    your own; by default colour, and box in any_colour."""
     scenario: str = "clear,opaque,translucent,mirror"
     """Scenario names, separated by commas."""
     episodes: int = 20
@@ -98,6 +102,7 @@ class Evaluate:
         check_policy(self.policy)
         config = EvaluationConfig(
             policy=self.policy,
+            detector=self.detector,
             scenarios=split_names(self.scenario),
             episodes=self.episodes,
             seed=self.seed,

@@ -37,6 +37,10 @@ class Observation:
     """Measured twist [v, w] of the camera expressed in ``cam``, shape (6,), m/s and rad/s."""
     gripper_width: float
     """Opening between the finger pads, m."""
+    target_box: FloatArray | None = None
+    """Which thing is the target: x, y, width, height of a box around it in the first image, px, shape (4,)."""
+    mask: MaskArray | None = None
+    """Pixels of the target, shape (H, W), where somebody else finds it."""
 
     @classmethod
     def from_dict(cls, obs: Mapping[str, Any]) -> Observation:
@@ -53,6 +57,8 @@ class Observation:
             time=float(np.asarray(obs["time"]).item()),
             rgb=np.asarray(obs["rgb"], dtype=np.uint8),
             gripper_width=float(np.asarray(obs["gripper_width"]).item()),
+            target_box=np.asarray(obs["target_box"], np.float64) if "target_box" in obs else None,
+            mask=np.asarray(obs["mask"], np.bool_) if "mask" in obs else None,
             **vectors,
         )
 

@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fixation_gym.envs.config import IMAGE_SIZE
 from fixation_gym.errors import UsageError
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.detection.box_tracker import BoxTracker
+from fixation_gym.perception.detection.colour import ColourDetector
+from fixation_gym.perception.detection.detector import Detector
+from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.pipeline import Perception
 from policies.base import Policy
 from policies.baselines import RandomPolicy
 from policies.rl.agent_file import read_card
 from policies.rl.config import CONFIGS, require_learning_packages
 from policies.servo.servo_policy import ServoPolicy
-from policies.servo.variants import VARIANT_NAMES, servo_variant
+from policies.servo.variants import VARIANT_NAMES, ServoVariant, servo_variant
+from policies.strangers import is_class_name, load_class, source_hash
 
 AGENT_SUFFIX = ".zip"
 POLICY_NAMES = ("servo", "blind", "random", "oracle", *(name for name in VARIANT_NAMES if ":" in name))
+DETECTORS: dict[str, Callable[[Intrinsics], Detector]] = {
+    "colour": ColourDetector,
+    "mean_shift": MeanShiftDetector,
+    "box": BoxTracker,
+}
+"""Detectors by name: what has the target's colour, the same followed in the image, and what the first box shows."""
+_POLICY_METHODS, _DETECTOR_METHODS = ("reset", "act"), ("reset", "detect")
 
 
 @dataclass(frozen=True)
@@ -40,8 +55,42 @@ def check_policy(name: str) -> None:
     if name.endswith(AGENT_SUFFIX):
         read_card(Path(name))
         require_learning_packages()
-    elif name not in POLICY_NAMES:
-        raise UsageError(f"unknown policy '{name}'; choose one of {', '.join(POLICY_NAMES)}, or an agent's .zip")
+    elif name in POLICY_NAMES:
+        return
+    elif is_class_name(name):
+        load_class(name, "--policy", _POLICY_METHODS)
+    else:
+        known = ", ".join(POLICY_NAMES)
+        raise UsageError(f"unknown policy '{name}'; choose one of {known}, an agent's .zip, or module:Class")
+
+
+def check_detector(name: str | None, policy: str) -> None:
+    """Check that a detector can be had, and that the policy takes one; None stands for the default.
+
+    Raises:
+        UsageError: if not, saying what is allowed.
+    """
+    if name is None:
+        return
+    if policy not in VARIANT_NAMES:
+        raise UsageError(f"--detector goes with the policies that look: {', '.join(VARIANT_NAMES)}; got '{policy}'")
+    if name in DETECTORS:
+        return
+    if not is_class_name(name):
+        raise UsageError(f"unknown detector '{name}'; choose one of {', '.join(DETECTORS)}, or module:Class")
+    load_class(name, "--detector", _DETECTOR_METHODS)
+
+
+def source_hashes(policy: str, detector: str | None) -> dict[str, str]:
+    """Of an agent's file and of somebody else's classes, what the files held: changed, they are others."""
+    hashes = {}
+    if policy.endswith(AGENT_SUFFIX):
+        hashes["policy_sha256"] = hashlib.sha256(Path(policy).read_bytes()).hexdigest()
+    elif policy not in POLICY_NAMES:
+        hashes["policy_sha256"] = source_hash(policy, "--policy", _POLICY_METHODS)
+    if detector is not None and detector not in DETECTORS:
+        hashes["detector_sha256"] = source_hash(detector, "--detector", _DETECTOR_METHODS)
+    return hashes
 
 
 def surroundings(name: str) -> Surroundings:
@@ -59,17 +108,21 @@ def surroundings(name: str) -> Surroundings:
     return Surroundings("fixation_gym:FixationPickZFC-v0", arguments, card.image_size)
 
 
-def make_policy(name: str, env: Any) -> Policy:
+def make_policy(name: str, env: Any, detector: str | None = None) -> Policy:
     """Build a policy for an environment made by ``gym.make("FixationPick-v0")``.
 
     Args:
-        name: one of ``POLICY_NAMES``, or the path of an agent for an environment as its ``surroundings``.
+        name: one of ``POLICY_NAMES``, the path of an agent for an environment as its ``surroundings``, or
+            ``module:Class``; such a class is called with the unwrapped environment.
         env: the environment; only "oracle" looks into it during an episode.
+        detector: one of ``DETECTORS`` or ``module:Class``, called with the camera's ``Intrinsics``. None: by colour, or
+            by the box in the first image where the target may be of any colour.
 
     Raises:
         UsageError: for an unknown name or a file that is no agent; the message says what is allowed.
     """
     check_policy(name)
+    check_detector(detector, name)
     if name.endswith(AGENT_SUFFIX):
         from policies.rl.agent import load_agent
 
@@ -80,8 +133,22 @@ def make_policy(name: str, env: Any) -> Policy:
         from policies.oracle import OraclePolicy
 
         return OraclePolicy(env.unwrapped)
+    if name not in VARIANT_NAMES:
+        return load_class(name, "--policy", _POLICY_METHODS)(env.unwrapped)
     from fixation_gym.envs.scene import TABLE_HEIGHT
 
-    variant = servo_variant(name)
-    perception = Perception(env.unwrapped.intrinsics, variant.perception, support_height_m=TABLE_HEIGHT)
+    variant, intrinsics = servo_variant(name), env.unwrapped.intrinsics
+    perception = Perception(
+        intrinsics,
+        variant.perception,
+        support_height_m=TABLE_HEIGHT,
+        detector=_detector(detector, variant, env.unwrapped)(intrinsics),
+    )
     return ServoPolicy(perception, variant.gains, variant.memory, variant.avoid_obstacles)
+
+
+def _detector(name: str | None, variant: ServoVariant, env: Any) -> Callable[[Intrinsics], Detector]:
+    """What makes the detector of that name."""
+    if name is None:
+        return variant.detector or (BoxTracker if env.scenario.any_colour else ColourDetector)
+    return DETECTORS[name] if name in DETECTORS else load_class(name, "--detector", _DETECTOR_METHODS)

@@ -58,7 +58,9 @@ def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
 
     image: dict[str, spaces.Space[Any]] = {}
     if image_size is not None:
-        image["rgb"] = spaces.Box(0, 255, (*image_size, 3), np.uint8)
+        height, width = image_size
+        image["rgb"] = spaces.Box(0, 255, (height, width, 3), np.uint8)
+        image["target_box"] = spaces.Box(0.0, np.array([width, height] * 2, np.float32), dtype=np.float32)
     return spaces.Dict(
         image
         | {

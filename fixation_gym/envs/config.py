@@ -73,6 +73,9 @@ class Scenario:
     coloured_frames: bool = False
     """Whether frames and rims are of colours drawn anew for each obstacle, instead of one dark grey. Nothing else of a
     scene differs."""
+    any_colour: bool = False
+    """Whether target, distractor and obstacles are of any colour and texture; the box in the first image tells which
+    thing is the target. Nothing else of a scene differs."""
 
     def __post_init__(self) -> None:
         _require_names("obstacle_materials", self.obstacle_materials, MATERIALS)
@@ -94,7 +97,7 @@ class Scenario:
         _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
         _require_probability("target_moves", self.target_moves)
         _require_probability("distractor", self.distractor)
-        for name in ("through_sight", "discovery", "coloured_frames"):
+        for name in ("through_sight", "discovery", "coloured_frames", "any_colour"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"{name} must be true or false, got {getattr(self, name)!r}")
         self._check_obstacles()
@@ -189,6 +192,9 @@ SCENARIOS: dict[str, Scenario] = {
             free_elevation_deg=(46.0, 82.0),
         ),
         Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
+        Scenario(
+            "any_colour", ("opaque", "translucent", "wire"), obstacle_count=(2, 6), distractor=0.5, any_colour=True
+        ),
         Scenario(
             "discovery",
             ("mirror", "opaque"),

@@ -14,8 +14,10 @@ from fixation_gym.envs import config, rewards, sensors
 from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
+from fixation_gym.envs.target_box import target_box
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
+from fixation_gym.perception.detection.box_tracker import BoxTracker
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
@@ -51,6 +53,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     | ``camera_pose`` | (7,) | position in m and quaternion (w, x, y, z) of the camera in the robot base frame |
     | ``camera_twist`` | (6,) | measured twist [v, w] in the camera frame, m/s and rad/s |
     | ``time`` | (1,) | s since reset |
+    | ``target_box`` | (4,) | which thing is the target: x, y, width, height in px of the first image, 0 out of it |
 
     **Reward** ``"dense"``: potential-based progress, -0.004 per step, +10 on success, -5 for the first collision;
     ``"sparse"``: +1 on success, -1 for the first collision. The terms, ``progress``, ``time``, ``success`` and
@@ -117,7 +120,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._sim: PickSim | None = None
         self._views: dict[str, View] = {}
         self._window: Window | None = None
-        self._perception = Perception(self.intrinsics, support_height_m=TABLE_HEIGHT)
+        detector = BoxTracker(self.intrinsics) if self.scenario.any_colour else None
+        self._perception = Perception(self.intrinsics, support_height_m=TABLE_HEIGHT, detector=detector)
         self._percept: Percept | None = None
         self.scene: SceneSpec | None = None
         self.camera_on = True
@@ -140,6 +144,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._collided = False
         self._perception.reset()
         self.camera_on = True
+        self._target_box = target_box(self.scene.target, self.sim.arm_state().camera_pose, self.intrinsics)
         self._state = self._task_state()
         observation = self._observe(self.sim.data.qpos)
         if self.render_mode == "human":
@@ -248,6 +253,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self._noise_rng)
         if self._image_size is not None:
             observation["rgb"] = self._last_rgb.copy()
+            observation["target_box"] = self._target_box.astype(np.float32)
         joint_pos, joint_vel = sensors.measure_joints(state.joint_pos, state.joint_vel, self.noise, self._noise_rng)
         pose = sensors.measure_camera_pose(
             state.camera_pose, state.jacobian, joint_pos - state.joint_pos, self._errors.hand_eye

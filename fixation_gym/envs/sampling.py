@@ -35,6 +35,8 @@ _FOLDED = 0.36
 """Nearer to the base's axis the arm does not start, m."""
 _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
+_TARGET_TEXTURES = ("bricks", "wood_light", "metal")
+"""Textures of targets of any colour."""
 _FRAME_HUES = (1.0 / 8.0, 7.0 / 8.0)
 """Range of the hue of coloured frames, 0..1: anything but the target's red."""
 _ELEVATION_SHAPE, _AZIMUTH_SHAPE = (0.5, 0.65), (0.75, 0.6)
@@ -124,7 +126,9 @@ def _scene(
         free_way=(goal.free.azimuth, goal.free.elevation) if obstacles else None,
     )
     # From a generator of their own: nothing else of the scene depends on the colours.
-    return _with_coloured_frames(scene, rng.spawn(1)[0]) if scenario.coloured_frames else scene
+    if scenario.coloured_frames:
+        return _with_coloured_frames(scene, rng.spawn(1)[0])
+    return _with_any_colours(scene, rng.spawn(1)[0]) if scenario.any_colour else scene
 
 
 def _sample_view(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> View | None:
@@ -174,6 +178,33 @@ def _with_coloured_frames(scene: SceneSpec, rng: np.random.Generator) -> SceneSp
         red, green, blue = colorsys.hsv_to_rgb(rng.uniform(*_FRAME_HUES), rng.uniform(0.0, 1.0), rng.uniform(0.1, 1.0))
         obstacles.append(replace(obstacle, frame_rgba=(red, green, blue, 1.0)))
     return replace(scene, obstacles=tuple(obstacles))
+
+
+def _with_any_colours(scene: SceneSpec, rng: np.random.Generator) -> SceneSpec:
+    """Targets and obstacles of any colour, half of them textured; a distractor does not look like the target."""
+    hue = float(rng.uniform(0.0, 1.0))
+    target, distractor = _dressed(scene.target, hue, rng), scene.distractor
+    if distractor is not None:
+        distractor = _dressed(distractor, (hue + float(rng.uniform(0.2, 0.8))) % 1.0, rng)
+    obstacles = tuple(
+        replace(
+            obstacle,
+            tint=_colour(float(rng.uniform(0.0, 1.0)), rng),
+            frame_rgba=_colour(float(rng.uniform(0.0, 1.0)), rng),
+        )
+        for obstacle in scene.obstacles
+    )
+    return replace(scene, target=target, distractor=distractor, obstacles=obstacles)
+
+
+def _dressed(spec: TargetSpec, hue: float, rng: np.random.Generator) -> TargetSpec:
+    texture = str(rng.choice(_TARGET_TEXTURES)) if rng.random() < 0.5 else None
+    return replace(spec, rgba=_colour(hue, rng), texture=texture)
+
+
+def _colour(hue: float, rng: np.random.Generator) -> tuple[float, float, float, float]:
+    red, green, blue = colorsys.hsv_to_rgb(hue, rng.uniform(0.4, 1.0), rng.uniform(0.3, 1.0))
+    return red, green, blue, 1.0
 
 
 def _vector(values: FloatArray) -> Vector:

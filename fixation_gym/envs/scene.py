@@ -16,6 +16,10 @@ TABLE_HEIGHT = -0.112
 """Height of the table top in the robot base frame, m."""
 TARGET_REGION = ((0.50, 0.62), (-0.14, 0.14))
 """Ranges of x and y in which the target is placed, in base, m."""
+RED = (0.80, 0.06, 0.05, 1.0)
+"""Colour of targets and distractors, where it is not drawn."""
+UNTINTED = (1.0, 1.0, 1.0, 1.0)
+"""Leaves a texture its own colours."""
 DARK_FRAME = (0.16, 0.17, 0.20, 1.0)
 """Usual colour of frames and rims."""
 
@@ -29,6 +33,9 @@ class TargetSpec:
     position: Vector
     yaw: float
     motion: Motion | None = None
+    rgba: tuple[float, float, float, float] = RED
+    texture: str | None = None
+    """None: plain."""
 
     @property
     def box(self) -> Box:
@@ -55,6 +62,8 @@ class ObstacleSpec:
     texture: str
     motion: Motion | None = None
     frame_rgba: tuple[float, float, float, float] = DARK_FRAME
+    tint: tuple[float, float, float, float] = UNTINTED
+    """Of what is textured."""
 
     @property
     def box(self) -> Box:

@@ -14,7 +14,7 @@ import numpy as np
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.object_pool import SLOTS, TARGET_SHAPES, target_shape
 from fixation_gym.envs.pool_slots import slots_for
-from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
+from fixation_gym.envs.scene import UNTINTED, ObstacleSpec, SceneSpec, TargetSpec
 from fixation_gym.envs.scene_mjcf import (
     MIRROR_MATERIAL,
     RED_BODIES,
@@ -27,9 +27,7 @@ from fixation_gym.envs.scene_mjcf import (
 from fixation_gym.envs.shapes import Part, Shape, Vector
 from fixation_gym.types import FloatArray
 
-TARGET_RGBA = (0.80, 0.06, 0.05, 1.0)
 _LABEL_RGBA = (0.85, 0.85, 0.25, 1.0)
-_UNTINTED = (1.0, 1.0, 1.0, 1.0)
 
 _WRITTEN_FIELDS = (
     *("geom_type", "geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb", "geom_group", "geom_contype"),
@@ -107,7 +105,9 @@ class SceneLoader:
         for entry in self._red[body, spec.shape]:
             size = entry.size * _size_factors(entry.part, factors)
             self._show(entry.geom, entry.part, size, np.array(entry.part.pos) * factors)
-            self._model.geom_rgba[entry.geom] = TARGET_RGBA
+            self._model.geom_rgba[entry.geom] = spec.rgba
+            if spec.texture is not None:
+                self._model.geom_matid[entry.geom] = self._materials[spec.texture]
         self._weigh(body, shape, factors)
         return Placement(spec.position, spec.yaw, spec.motion)
 
@@ -123,7 +123,7 @@ class SceneLoader:
             self._show(geom, part, size, np.array(part.pos))
             material = materials.get(part.finish)
             model.geom_matid[geom] = -1 if material is None else self._materials[material]
-            model.geom_rgba[geom] = colours.get(part.finish, _UNTINTED)
+            model.geom_rgba[geom] = colours.get(part.finish, obstacle.tint if part.finish == "solid" else UNTINTED)
         self._weigh(slot, obstacle.shape, np.ones(3))
 
     def _show(self, geom: int, part: Part, size: FloatArray, position: FloatArray) -> None:

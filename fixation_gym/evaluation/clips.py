@@ -119,6 +119,7 @@ def _cell(evaluation: Evaluation, result: EpisodeResult) -> workers.Cell:
         "seed": result.seed,
         "sensor_noise": run["sensor_noise"],
         "image_size": run["image_size"],
+        "detector": run.get("detector"),
         "decisions": moments(result, evaluation.trace(result)),
     }
 

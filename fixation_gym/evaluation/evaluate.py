@@ -41,6 +41,8 @@ class EvaluationConfig:
     """Height and width of the wrist image, px."""
     env_id: str | None = None
     """None: the environment in which the policy acts."""
+    detector: str | None = None
+    """Finds the target for a policy that looks: a name, or ``module:Class``; None for the default."""
     workers: int = 1
     backend: str = "loky"
 
@@ -51,9 +53,10 @@ class EvaluationConfig:
             UsageError: naming the first bad value and what is allowed.
         """
         from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
-        from policies.catalogue import check_policy
+        from policies.catalogue import check_detector, check_policy
 
         check_policy(self.policy)
+        check_detector(self.detector, self.policy)
         check_names(self.scenarios, SCENARIO_NAMES, "scenario")
         check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
         if not self.scenarios or len(set(self.scenarios)) < len(self.scenarios):
@@ -73,20 +76,18 @@ class EvaluationConfig:
 
         return self.env_id or surroundings(self.policy).env_id
 
-    def _file_hash(self) -> dict[str, str]:
-        """Of an agent, what its file held: another one under the same name is another policy."""
-        path = Path(self.policy)
-        return {"policy_sha256": hashlib.sha256(path.read_bytes()).hexdigest()} if path.suffix == ".zip" else {}
-
     def run_description(self) -> dict[str, Any]:
         """Everything the result of one episode depends on, apart from its scenario and seed."""
+        from policies.catalogue import source_hashes
+
         return {
             "policy": self.policy,
             "seed": self.seed,
             "sensor_noise": self.sensor_noise,
             "image_size": list(self.image_size),
             "env_id": self.environment,
-            **self._file_hash(),
+            **({} if self.detector is None else {"detector": self.detector}),
+            **source_hashes(self.policy, self.detector),
             "gl": os.environ.get("MUJOCO_GL"),
             "versions": installed_versions(),
         }
@@ -102,6 +103,7 @@ class EvaluationConfig:
             "env_id": self.environment,
             "scenario": scenario,
             "policy": self.policy,
+            "detector": self.detector,
             "seed": seed,
             "sensor_noise": self.sensor_noise,
             "image_size": list(self.image_size),

@@ -17,7 +17,7 @@ from policies.base import Policy
 BACKENDS = ("loky", "ray")
 
 Cell = dict[str, Any]
-"""One episode to run: env_id, scenario, policy, seed, sensor_noise, image_size. JSON-able and picklable."""
+"""One episode to run: env_id, scenario, policy, detector, seed, sensor_noise, image_size. JSON-able and picklable."""
 
 _worlds: dict[tuple[Any, ...], tuple[gymnasium.Env, Policy]] = {}  # at most one: environments are large
 
@@ -40,7 +40,7 @@ def world(cell: Cell, render_mode: str | None = None) -> tuple[gymnasium.Env, Po
     if key not in _worlds:
         close_worlds()
         env = make_env(cell, render_mode)
-        _worlds[key] = (env, make_policy(cell["policy"], env))
+        _worlds[key] = (env, make_policy(cell["policy"], env, cell.get("detector")))
     return _worlds[key]
 
 
@@ -67,11 +67,11 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
     )
 
 
-def make_policy(name: str, env: gymnasium.Env) -> Policy:
-    """Build a policy by its name."""
+def make_policy(name: str, env: gymnasium.Env, detector: str | None = None) -> Policy:
+    """Build a policy by its name, with a detector by its name."""
     from policies import catalogue
 
-    return catalogue.make_policy(name, env)
+    return catalogue.make_policy(name, env, detector)
 
 
 @atexit.register

@@ -1,6 +1,9 @@
 """From images and camera poses to the fixated distance and the zero-flow map: NumPy, SciPy, OpenCV."""
 
-from fixation_gym.perception.detection.segmentation import RED, Colour, Segmentation, segment
+from fixation_gym.perception.detection.colour import RED, Colour, ColourDetector, segment
+from fixation_gym.perception.detection.detector import Detector, GivenMasks
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.detection.tracking import Expectation
 from fixation_gym.perception.distance.pose_filter import DistanceSettings, Fixation
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.flow.optic_flow import Flow, FlowSettings
@@ -12,10 +15,14 @@ from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow, ZeroFlowSettin
 __all__ = [
     "RED",
     "Colour",
+    "ColourDetector",
+    "Detector",
     "DistanceSettings",
+    "Expectation",
     "Fixation",
     "Flow",
     "FlowSettings",
+    "GivenMasks",
     "Percept",
     "Perception",
     "PerceptionSettings",

@@ -13,9 +13,10 @@ from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception.body.target_centre import TargetBody, with_outline
 from fixation_gym.perception.body.upright_body import UprightBody
-from fixation_gym.perception.detection.mean_shift import Window, expected_in, shifted, window_around
-from fixation_gym.perception.detection.segmentation import Segmentation, coloured_pixels, segment
-from fixation_gym.perception.detection.tracking import Expectation, Track, expected_at, followed
+from fixation_gym.perception.detection.colour import ColourDetector, segment
+from fixation_gym.perception.detection.detector import Detector, detected
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.detection.tracking import Track, expected_at, followed
 from fixation_gym.perception.distance import pose_filter as distance
 from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze
 from fixation_gym.perception.distance.following import Frame, follow_constraint, follow_poses, mean_variance, mended
@@ -61,6 +62,7 @@ class Perception:
         settings: PerceptionSettings | None = None,
         self_mask: MaskArray | None = None,
         support_height_m: float | None = None,
+        detector: Detector | None = None,
     ) -> None:
         """Prepare for a camera.
 
@@ -69,6 +71,7 @@ class Perception:
             settings: of every stage; None for the defaults.
             self_mask: pixels where the camera sees the robot itself, shape (H, W); never obstacles.
             support_height_m: height of the table in base, m; its surface is no obstacle. None: unknown.
+            detector: says which pixels are the target; None: those of the colour in ``settings``.
 
         Raises:
             ValueError: if ``self_mask`` has not the size of the images.
@@ -80,6 +83,7 @@ class Perception:
         self._settings = settings or PerceptionSettings()
         self._self_mask = None if self_mask is None else np.array(self_mask, dtype=np.bool_)
         self.support_height_m = support_height_m
+        self._detector: Detector = detector or ColourDetector(intrinsics, self._settings.colour)
         halvings = 0
         while intrinsics.width > self._settings.flow.max_width * 2**halvings:
             halvings += 1
@@ -94,8 +98,8 @@ class Perception:
         self._frames: deque[Frame] = deque(maxlen=3)
         self._state: DistanceState | None = None
         self._constrained: ConstrainedGaze | None = None
+        self._detector.reset()
         self._track: Track | None = None
-        self._window: Window | None = None
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
         self._covered_time = -math.inf
         self._body = TargetBody()
@@ -114,7 +118,8 @@ class Perception:
         """
         self._check(observation)
         T_base_cam = pose_to_matrix(observation.camera_pose)
-        segmentation = self._segment(observation, T_base_cam)
+        expected = expected_at(self._track, T_base_cam, observation.time, self._settings.tracking)
+        segmentation = detected(self._detector, observation, expected, self._intrinsics)
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         frame = Frame(observation.time, grey, T_base_cam, observation.camera_twist, segmentation)
         self._follow(frame)
@@ -126,7 +131,7 @@ class Perception:
         zero_flow = self._look_for_obstacles(flow)
         fixation = self._fixation(T_base_cam, segmentation)
         if segmentation.visible:
-            self._note(segmentation, fixation.distance_m, T_base_cam, observation.time)
+            self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
         body = self._fit_body(frame, fixation)
         return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam, body)
@@ -142,27 +147,6 @@ class Perception:
         if self._frames and not observation.time > self._frames[-1].time:
             last = self._frames[-1].time
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
-
-    def _segment(self, observation: Observation, T_base_cam: FloatArray) -> Segmentation:
-        expected = self._expected(observation, T_base_cam)
-        return segment(observation.rgb, self._intrinsics, self._settings.colour, expected.centroid, expected.reach)
-
-    def _expected(self, observation: Observation, T_base_cam: FloatArray) -> Expectation:
-        """Where the target should be in the image."""
-        tracking = self._settings.tracking
-        if tracking.method == "mean_shift":
-            coloured = coloured_pixels(observation.rgb, self._settings.colour)
-            self._window = None if self._window is None else shifted(self._window, coloured)
-            return expected_in(self._window, coloured, self._intrinsics, observation.time, tracking)
-        return expected_at(self._track, T_base_cam, observation.time, tracking)
-
-    def _note(self, seen: Segmentation, depth: float, T_base_cam: FloatArray, time: float) -> None:
-        """Note where the target is; without tracking it stays unknown."""
-        method = self._settings.tracking.method
-        if method == "camera_motion":
-            self._track = followed(seen, depth, T_base_cam, time)
-        elif method == "mean_shift":
-            self._window = window_around(seen, time)
 
     def _follow(self, now: Frame) -> None:
         """Advance the distance filter to now."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fixation_gym.perception.body.target_centre import CentreSettings
-from fixation_gym.perception.detection.segmentation import RED, Colour
+from fixation_gym.perception.detection.colour import RED, Colour
 from fixation_gym.perception.detection.tracking import TrackingSettings
 from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.distance.pose_filter import DistanceSettings
@@ -18,9 +18,9 @@ class PerceptionSettings:
     """Settings of every stage."""
 
     colour: Colour = RED
-    """Colour of the target."""
+    """Colour of the target, unless a detector is given."""
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
-    """How the target is told from other things of its colour."""
+    """How far off the target may be from where it was last seen."""
     flow: FlowSettings = field(default_factory=FlowSettings)
     """Resolution, windows and noise of the flow."""
     distance: DistanceSettings = field(default_factory=DistanceSettings)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 from fixation_gym.control.gaze import GazeGains
 from fixation_gym.control.ways import WayCosts
-from fixation_gym.perception.detection.tracking import TrackingSettings
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.detection.colour import ColourDetector
+from fixation_gym.perception.detection.detector import Detector
+from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.evidence_map import ZeroFlowSettings
@@ -25,6 +30,8 @@ class ServoVariant:
     gains: ServoGains = field(default_factory=ServoGains)
     perception: PerceptionSettings = field(default_factory=PerceptionSettings)
     memory: MemorySettings = field(default_factory=MemorySettings)
+    detector: Callable[[Intrinsics], Detector] | None = None
+    """Makes its detector; None: the default."""
     avoid_obstacles: bool = True
     """False takes its map away: it comes in along its first line of sight."""
 
@@ -66,12 +73,12 @@ VARIANTS: tuple[ServoVariant, ...] = (
     ServoVariant(
         "servo:no_tracking",
         "tracking: every image is segmented like the first",
-        perception=PerceptionSettings(tracking=TrackingSettings(method="none")),
+        detector=partial(ColourDetector, follow=False),
     ),
     ServoVariant(
         "servo:opencv_tracker",
         "the camera's motion when the target is tracked: OpenCV's mean shift follows it in the image",
-        perception=PerceptionSettings(tracking=TrackingSettings(method="mean_shift")),
+        detector=MeanShiftDetector,
     ),
     ServoVariant(
         "servo:no_body",

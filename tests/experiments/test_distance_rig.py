@@ -11,7 +11,7 @@ import pytest
 from fixation_gym.envs.config import SENSOR_NOISE
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, HOME, INTRINSICS, Condition
 from fixation_gym.geometry.rigid import inverse, look_at, transform
-from fixation_gym.perception.detection.segmentation import segment
+from fixation_gym.perception.detection.colour import segment
 from fixation_gym.perception.distance.flat_target import coverage, flat_centroid
 
 pytestmark = pytest.mark.sim

@@ -13,7 +13,7 @@ from scipy.special import ndtr
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception import Colour, Perception
-from fixation_gym.perception.detection import segmentation
+from fixation_gym.perception.detection import colour as segmentation
 from fixation_gym.perception.flow import gradients, kernels
 from fixation_gym.perception.zero_flow import zero_flow
 from fixation_gym.perception.zero_flow.evidence_map import evidence_map

@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.detection.segmentation import segment
+from fixation_gym.perception.detection.colour import segment
+from fixation_gym.perception.detection.tracking import Expectation
 
 CAMERA = Intrinsics.from_fovy(240, 320, np.deg2rad(42.5))
 RED = (190, 25, 20)
@@ -70,7 +71,7 @@ def test_a_second_red_object_is_not_mixed_in_and_the_expected_place_decides():
     cv2.circle(image, (80, 120), 20, RED, -1)
     cv2.circle(image, (240, 120), 24, RED, -1)
     largest = segment(noisy(image), CAMERA)
-    expected = segment(noisy(image), CAMERA, expected=CAMERA.normalise(np.array([85.0, 122.0])))
+    expected = segment(noisy(image), CAMERA, expected=Expectation(CAMERA.normalise(np.array([85.0, 122.0])), np.inf))
     np.testing.assert_allclose(largest.centroid, CAMERA.normalise(np.array([240, 120])), atol=0.4 / CAMERA.fx)
     np.testing.assert_allclose(expected.centroid, CAMERA.normalise(np.array([80, 120])), atol=0.4 / CAMERA.fx)
 
@@ -102,7 +103,7 @@ def test_any_image_size_can_show_the_target_at_any_edge_beside_something_else(si
     other = (width // 4, height // 2 + 10)
     for centre in (place, other):
         cv2.circle(image, centre, radius, RED, -1)
-    seen = segment(image, camera, expected=camera.normalise(np.array(place)), reach=0.15)
+    seen = segment(image, camera, expected=Expectation(camera.normalise(np.array(place)), 0.15))
     assert seen.touches_border
     assert seen.mask[min(place[1], height - 2), min(place[0], width - 2)]
     assert not seen.mask[other[1], other[0]]

@@ -7,8 +7,8 @@ import pytest
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, transform
 from fixation_gym.perception import Perception
-from fixation_gym.perception.detection.segmentation import segment
-from fixation_gym.perception.detection.tracking import TrackingSettings, expected_at, followed
+from fixation_gym.perception.detection.colour import segment
+from fixation_gym.perception.detection.tracking import FIRST_LOOK, TrackingSettings, expected_at, followed
 from fixation_gym.types import Observation
 
 CAMERA = Intrinsics.from_fovy(120, 160, np.deg2rad(42.5))
@@ -86,7 +86,7 @@ def test_a_pushed_target_is_followed_also_if_it_is_hidden_meanwhile(hides):
 
 def test_the_expected_place_of_a_thing_at_rest_is_exact_for_any_motion():
     first, later = pose_at(0.0), pose_at(1.3)
-    seen = segment(picture(0.0), CAMERA, expected=np.zeros(2))
+    seen = segment(picture(0.0), CAMERA, expected=FIRST_LOOK)
     depth = float(first[:3, 2] @ (TARGET - first[:3, 3]))
     expected = expected_at(followed(seen, depth, first, 0.0), later, 1.3, SETTINGS)
     truth = image_point(transform(first, depth * np.append(seen.centroid, 1.0)), later)

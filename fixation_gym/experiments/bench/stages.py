@@ -11,7 +11,8 @@ from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
-from fixation_gym.perception.detection.segmentation import segment
+from fixation_gym.perception.detection.colour import segment
+from fixation_gym.perception.detection.tracking import Expectation
 from fixation_gym.perception.distance import pose_filter as distance
 from fixation_gym.perception.flow.optic_flow import estimate_flow, plane_homography, prepare_grey
 from fixation_gym.perception.percept import Percept
@@ -58,7 +59,8 @@ def stages(camera: Intrinsics, observations: Sequence[Observation]) -> Iterator[
 
     def segment_next(index: int) -> Any:
         moment = moments[index]
-        return segment(moment.rgbs[2], camera, _SETTINGS.colour, moment.percept.fixation.centroid)
+        expected = Expectation(moment.percept.fixation.centroid, math.inf)
+        return segment(moment.rgbs[2], camera, _SETTINGS.colour, expected)
 
     def map_of(index: int) -> Any:
         moment = moments[index]

@@ -30,7 +30,7 @@ from fixation_gym.experiments.distance.sequence import (
 )
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.perception.detection.segmentation import segment
+from fixation_gym.perception.detection.colour import segment
 from fixation_gym.perception.distance import calibrating_filter
 from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
 from fixation_gym.perception.distance.flat_target import coverage, flat_centroid

@@ -14,9 +14,10 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.detection.colour import RED, Colour, colour_mask, coloured_pixels
+from fixation_gym.perception.detection.segmentation import segmentation_of
 from fixation_gym.perception.detection.tracking import FIRST_LOOK, NOWHERE, Expectation, TrackingSettings
-from fixation_gym.types import ImageArray
+from fixation_gym.types import ImageArray, MaskArray, Observation
 
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 1.0)
 """Mean shift ends after 20 steps, or with one below 1 px."""
@@ -37,9 +38,32 @@ class Window:
     """When it was last seen, s."""
 
 
-def window_around(seen: Segmentation, time: float) -> Window:
-    """Note where the visible target is at a time, s."""
-    left, top, width, height = cv2.boundingRect(seen.mask.view(np.uint8))
+class MeanShiftDetector:
+    """Finds the target by its colour where OpenCV's mean shift follows it in the image."""
+
+    def __init__(self, intrinsics: Intrinsics, colour: Colour = RED) -> None:
+        """Prepare for images of a camera and a target of a colour."""
+        self._intrinsics, self._colour, self._settings = intrinsics, colour, TrackingSettings()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget where the target was."""
+        self._window: Window | None = None
+
+    def detect(self, observation: Observation, expected: Expectation) -> MaskArray:
+        """Pixels of the target, shape (H, W); where the camera's motion expects it is not asked."""
+        coloured = coloured_pixels(observation.rgb, self._colour)
+        self._window = None if self._window is None else shifted(self._window, coloured)
+        place = expected_in(self._window, coloured, self._intrinsics, observation.time, self._settings)
+        mask = colour_mask(observation.rgb, self._intrinsics, self._colour, place)
+        if segmentation_of(mask, self._intrinsics).visible:
+            self._window = window_around(mask, observation.time)
+        return mask
+
+
+def window_around(mask: MaskArray, time: float) -> Window:
+    """Note where the visible target is at a time, s; ``mask`` has shape (H, W)."""
+    left, top, width, height = cv2.boundingRect(mask.view(np.uint8))
     return Window((left, top, width, height), time)
 
 

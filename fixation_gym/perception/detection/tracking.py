@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -20,11 +19,8 @@ from fixation_gym.types import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class TrackingSettings:
-    """How the target is told from other things of its colour."""
+    """How far off the target may be from where it was last seen."""
 
-    method: Literal["camera_motion", "mean_shift", "none"] = "camera_motion"
-    """"camera_motion": it is where it was last seen in base. For comparison, "mean_shift": it is where OpenCV's tracker
-    follows it in the image; "none": it is found anew in every image, as in the first."""
     slack: float = 0.03
     """Offset that is always allowed, normalised coordinates."""
     size_share: float = 1.5
@@ -56,7 +52,9 @@ class Expectation:
     centroid: FloatArray
     """Normalised image coordinates, shape (2,)."""
     reach: float
-    """Largest offset from there, normalised coordinates."""
+    """Largest offset from there, normalised coordinates; inf: it may be anywhere."""
+    size: float = 0.0
+    """Standard deviation of its pixels about the centroid, normalised coordinates; 0 if not known."""
 
 
 FIRST_LOOK = Expectation(np.zeros(2), math.inf)
@@ -98,4 +96,4 @@ def expected_at(track: Track | None, T_base_cam: FloatArray, time: float, settin
     if z <= 0.0:
         return NOWHERE
     moved = settings.size_share * track.size_m + min(settings.speed * unseen, settings.largest_move_m)
-    return Expectation(np.array([x / z, y / z]), settings.slack + moved / z)
+    return Expectation(np.array([x / z, y / z]), settings.slack + moved / z, track.size_m / z)

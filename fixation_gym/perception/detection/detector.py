@@ -1,0 +1,73 @@
+"""The door for detectors: whoever can say which pixels of an image are the target."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.detection.segmentation import Segmentation, segmentation_of
+from fixation_gym.perception.detection.tracking import Expectation
+from fixation_gym.types import MaskArray, Observation
+
+
+class Detector(Protocol):
+    """Says which pixels of an image are the target."""
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        ...
+
+    def detect(self, observation: Observation, expected: Expectation) -> MaskArray:
+        """Find the target in one image.
+
+        Args:
+            observation: with the image ``rgb``, shape (H, W, 3), uint8, which must be left as it is.
+            expected: where the target should be, by what was seen of it before and how the camera moved since.
+
+        Returns:
+            Pixels of the target, shape (H, W), bool; all False if it is not in the image.
+        """
+        ...
+
+
+class GivenMasks:
+    """Takes the target's mask from the observation: somebody else has found it."""
+
+    def reset(self) -> None:
+        """Nothing is kept between images."""
+
+    def detect(self, observation: Observation, expected: Expectation) -> MaskArray:
+        """The mask of the observation.
+
+        Raises:
+            ValueError: if it has none.
+        """
+        if observation.mask is None:
+            raise ValueError("the observation has no mask; give it one (all False while the target is not seen)")
+        return observation.mask
+
+
+def detected(
+    detector: Detector, observation: Observation, expected: Expectation, intrinsics: Intrinsics
+) -> Segmentation:
+    """What a detector finds, checked and measured.
+
+    Raises:
+        ValueError: if its mask is none of the image.
+        RuntimeError: from whatever the detector raised, naming whose code it was.
+    """
+    name = f"{type(detector).__module__}.{type(detector).__qualname__}"
+    try:
+        mask = detector.detect(observation, expected)
+    except Exception as error:
+        if name.startswith("fixation_gym."):
+            raise
+        raise RuntimeError(f"the detector {name} failed: {type(error).__name__}: {error}") from error
+    expects = f"the detector {name} must return a bool array of shape {(intrinsics.height, intrinsics.width)}"
+    if not isinstance(mask, np.ndarray):
+        raise ValueError(f"{expects}, got {type(mask).__name__}")
+    if mask.dtype != np.bool_ or mask.shape != (intrinsics.height, intrinsics.width):
+        raise ValueError(f"{expects}, got {mask.dtype} of shape {mask.shape}")
+    return segmentation_of(mask.copy(), intrinsics)  # which makes it read-only

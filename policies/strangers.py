@@ -1,0 +1,60 @@
+"""Somebody else's classes, named as ``module:Class`` on the command line."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import inspect
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from fixation_gym.errors import UsageError
+
+
+def is_class_name(name: str) -> bool:
+    """Whether a name is meant as ``module:Class``."""
+    module, colon, attribute = name.partition(":")
+    return bool(colon) and attribute.isidentifier() and all(part.isidentifier() for part in module.split("."))
+
+
+def load_class(name: str, option: str, methods: tuple[str, ...]) -> type[Any]:
+    """Import a class by ``module:Class``; modules are also looked for in the present folder.
+
+    Args:
+        name: of the class.
+        option: of the command line that names it, for messages.
+        methods: that it must have.
+
+    Raises:
+        UsageError: if there is no such class, or it lacks a method. What the module itself raises stays as it is.
+    """
+    module_name, _, attribute = name.partition(":")
+    if os.getcwd() not in sys.path:  # a console script's path begins with its own folder
+        sys.path.append(os.getcwd())
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        if error.name is None or not module_name.startswith(error.name):
+            raise  # a package that the stranger's own code needs
+        raise UsageError(
+            f"{option} {name}: there is no module {error.name!r}; install it, or run in the folder that holds it"
+        ) from error
+    found = getattr(module, attribute, None)
+    if not inspect.isclass(found):
+        raise UsageError(f"{option} {name}: module {module_name!r} has no class {attribute!r}")
+    missing = [method for method in methods if not callable(getattr(found, method, None))]
+    if missing:
+        needed = " and ".join(f"{method}()" for method in methods)
+        raise UsageError(f"{option} {name}: the class needs {needed}, and lacks {', '.join(missing)}")
+    return found
+
+
+def source_hash(name: str, option: str, methods: tuple[str, ...]) -> str:
+    """SHA-256 of the file that holds a class: after a change it is another one.
+
+    Raises:
+        UsageError: as ``load_class``.
+    """
+    return hashlib.sha256(Path(inspect.getfile(load_class(name, option, methods))).read_bytes()).hexdigest()
