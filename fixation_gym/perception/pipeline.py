@@ -95,10 +95,14 @@ class Perception:
 
     def reset(self) -> None:
         """Forget everything seen."""
+        self._detector.reset()
+        self.forget_place()
+
+    def forget_place(self) -> None:
+        """Forget where the target is, but not what it looks like: it was pushed or dropped."""
         self._frames: deque[Frame] = deque(maxlen=3)
         self._state: DistanceState | None = None
         self._constrained: ConstrainedGaze | None = None
-        self._detector.reset()
         self._track: Track | None = None
         self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
         self._covered_time = -math.inf

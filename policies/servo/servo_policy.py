@@ -102,7 +102,7 @@ class ServoPolicy:
         manoeuvring = self._manoeuvre is not None
         command = self.command(self.percept, observation)
         if manoeuvring and self._manoeuvre is None:
-            self._perception.reset()  # the target was pushed or dropped, so nothing known about it holds
+            self._perception.forget_place()  # the target was pushed or dropped
         return command
 
     def command(self, percept: Percept, observation: Observation) -> Command:

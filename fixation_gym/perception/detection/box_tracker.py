@@ -14,13 +14,12 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.detection.colour import best_group
 from fixation_gym.perception.detection.tracking import Expectation, TrackingSettings
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 
-_BINS = (8, 16, 16)
+_BINS = (8, 32, 32)
 """Bins of L, a and b: a target is told by its hue more than by its brightness, which light changes."""
-_SMOOTHING = (1.2, 0.8, 0.8)
+_SMOOTHING = (1.2, 1.0, 1.0)
 """Standard deviation over which a colour counts for its neighbours, bins."""
 _STILL, _OWN_SIZE = TrackingSettings().slack, TrackingSettings().size_share
 """Parts of the reach that are there while the target is in sight."""
@@ -37,16 +36,16 @@ class BoxTrackerSettings:
     learning: float = 0.04
     """Share of a new image in the histograms ..."""
     first_look: float = 0.5
-    """... and share that the target's first look keeps for ever: what follows slowly drifts far."""
+    """... and share that the first look keeps for ever: what follows slowly drifts far."""
     extent: float = 2.4
     """The target reaches about so many standard deviations of its pixels from where it is expected."""
-    prior: float = 6.0
+    prior: float = 8.0
     """How much likelier a pixel is on the target in its middle than at its end, in natural logarithms."""
     growth: float = 0.005
     """Largest share by which its size changes from one image to the next, beyond what the distance explains."""
     blur_px: int = 3
     """Window over which pixels say together what they are, px at 320 columns."""
-    merge_gap_fraction: float = 0.03
+    merge_gap_fraction: float = 0.015
     """Parts closer than this share of the image width belong together."""
     least_share: float = 0.5
     """What is smaller than this share of its size is not learnt from: something covers the target."""
@@ -76,7 +75,8 @@ class BoxTracker:
             box = checked_box(observation.target_box, self._intrinsics)
             mask = _cut_out(observation.rgb, box, self._settings.surroundings)
             self._learn(observation.rgb, mask, 1.0)
-            self._background = 0.5 * (self._background + _histogram(_bins(observation.rgb), ~mask))
+            self._around = 0.5 * (self._background + _histogram(_bins(observation.rgb), ~mask))
+            self._background = self._around
             self._sizes = (_size(mask, self._intrinsics),) * 2
             return mask
         size = self._expected_size(expected)
@@ -85,8 +85,7 @@ class BoxTracker:
         if window is None:
             return mask
         likely = self._likely(observation.rgb[window], window, expected, size)
-        gap = self._settings.merge_gap_fraction
-        mask[window] = best_group(likely, gap, self._intrinsics, window, expected).view(np.bool_)
+        mask[window] = self._one_thing(likely, window, expected, size)
         seen = _size(mask, self._intrinsics)
         if seen > self._settings.least_share * size:
             self._learn(observation.rgb, mask, self._settings.learning)
@@ -122,16 +121,33 @@ class BoxTracker:
         """Pixels that are likelier on the target than around it by their look and place; 0 or 1."""
         assert self._target is not None
         ratio = np.log((self._target + _LEAST) / (self._background + _LEAST)).astype(np.float32)
-        scores = np.clip(ratio, -4.0, 4.0)[_bins(part)]
+        scores = np.clip(ratio, -3.0, 3.0)[_bins(part)]
         side = max(1, round(self._settings.blur_px * self._intrinsics.width / 320)) | 1
         scores = cv2.blur(scores, (side, side))
         if math.isfinite(expected.reach):
-            x, y = (axis[window] for axis in self._intrinsics.grid)
             moved = max(0.0, expected.reach - _STILL - _OWN_SIZE * expected.size)
             extent = self._settings.extent * size + moved
-            away = ((x - expected.centroid[0]) ** 2 + (y - expected.centroid[1]) ** 2) / extent**2
+            away = self._off_middle(window, expected) / extent**2
             scores = scores + np.float32(self._settings.prior) * np.minimum(1.0 - away, 0.0).astype(np.float32)
         return (scores > 0.0).view(np.uint8)
+
+    def _one_thing(
+        self, likely: ImageArray, window: tuple[slice, slice], expected: Expectation, size: float
+    ) -> MaskArray:
+        """Of parts that lie close together, those with most pixels near where the middle of the target should be."""
+        side = max(3, round(self._settings.merge_gap_fraction * self._intrinsics.width)) | 1
+        count, labels = cv2.connectedComponents(cv2.dilate(likely, np.ones((side, side), np.uint8)))
+        weight = likely.astype(np.float64)
+        if math.isfinite(expected.reach):
+            weight *= np.exp(-0.5 * self._off_middle(window, expected) / max(size, 1e-6) ** 2)
+        share = np.bincount(labels.ravel(), weight.ravel(), count)
+        share[0] = 0.0
+        return (labels == int(np.argmax(share))) & (likely > 0) if share.any() else np.zeros(likely.shape, np.bool_)
+
+    def _off_middle(self, window: tuple[slice, slice], expected: Expectation) -> FloatArray:
+        """Squared offset of pixels from where the target is expected, normalised coordinates."""
+        x, y = (axis[window] for axis in self._intrinsics.grid)
+        return (x - expected.centroid[0]) ** 2 + (y - expected.centroid[1]) ** 2
 
     def _learn(self, rgb: ImageArray, mask: MaskArray, share: float) -> None:
         """Let the histograms follow an image; ``share`` 1 replaces them."""
@@ -143,13 +159,15 @@ class BoxTracker:
         bins = _bins(rgb[rows, columns])
         outside = cv2.dilate(inside, np.ones((5, 5), np.uint8)) == 0
         around = _histogram(bins, outside)
-        self._background = (1.0 - share) * self._background + share * around
         if self._target is None:
             self._first = self._target = _histogram(bins, inside > 0)
+            self._background = around
             return
+        keep = self._settings.first_look * share
+        lately = (1.0 - share) * self._background + share * around
+        self._background = (1.0 - keep) * lately + keep * self._around
         sure = cv2.erode(inside, np.ones((3, 3), np.uint8)) > 0
         lately = (1.0 - share) * self._target + share * _histogram(bins, sure)
-        keep = self._settings.first_look * share
         self._target = (1.0 - keep) * lately + keep * self._first
 
 
