@@ -13,16 +13,14 @@ from gymnasium import spaces
 from fixation_gym.envs import config, rewards, sensors
 from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
 from fixation_gym.envs.sampling import sample_scene
-from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
+from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.target_box import target_box
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
-from fixation_gym.perception.detection.box_tracker import BoxTracker
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.percept import Percept
-from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import CAMERA_FOVY, HAND_EYE, TWIST_LIMITS
-from fixation_gym.types import FloatArray, ImageArray, Observation
+from fixation_gym.types import FloatArray, ImageArray
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
@@ -91,7 +89,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             sensor_noise: "ideal", "nominal" or "conservative".
             control_frequency: steps per second: 10, 20, 25, 50 or 100.
             render_mode: None, "rgb_array" or "human" (MuJoCo's viewer; needs a display).
-            render_view: of "rgb_array": "wrist", "front" or "overlay" (both, annotated with what perception sees).
+            render_view: of "rgb_array": "wrist", "front" or "overlay" (both, annotated with the ``percept`` that who
+                acts has given to this environment).
             reward: "dense" or "sparse".
 
         Raises:
@@ -120,9 +119,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._sim: PickSim | None = None
         self._views: dict[str, View] = {}
         self._window: Window | None = None
-        detector = BoxTracker(self.intrinsics) if self.scenario.any_colour else None
-        self._perception = Perception(self.intrinsics, support_height_m=TABLE_HEIGHT, detector=detector)
-        self._percept: Percept | None = None
+        self.percept: Percept | None = None
+        """What whoever acts perceived in the last observation, if it says so: drawn into the overlay."""
         self.scene: SceneSpec | None = None
         self.camera_on = True
         """While False, steps render nothing, and the last image and percept stay: for training, in grasps."""
@@ -142,7 +140,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self._steps = 0
         self._steps_lifted = 0
         self._collided = False
-        self._perception.reset()
+        self.percept = None
         self.camera_on = True
         self._target_box = target_box(self.scene.target, self.sim.arm_state().camera_pose, self.intrinsics)
         self._state = self._task_state()
@@ -187,7 +185,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         if self.render_view == "front":
             return front
         scale = _FRONT_SIZE[0] / self.intrinsics.height
-        wrist = draw_overlay(self._last_rgb, self.perceive(), scale=scale)
+        wrist = draw_overlay(self._last_rgb, self.percept, scale=scale)
         return np.ascontiguousarray(np.hstack([wrist, front]))
 
     def close(self) -> None:
@@ -234,15 +232,6 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         """The last observation, whatever a wrapper makes of it."""
         return self._observation
 
-    def perceive(self) -> Percept:
-        """What perception makes of the last observation; it looks once, however often it is asked.
-
-        It needs every frame: call it after ``reset`` and after every step. Rendering the overlay does.
-        """
-        if self._percept is None:
-            self._percept = self._perception.update(Observation.from_dict(self._observation))
-        return self._percept
-
     # -- pieces --------------------------------------------------------------------------------------------------
 
     def _observe(self, exposed_qpos: FloatArray) -> dict[str, Any]:
@@ -270,10 +259,6 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             low, high = self._limits[key]
             observation[key] = np.minimum(np.maximum(value, low), high).astype(np.float32)
         self._observation = observation
-        if self.camera_on:
-            self._percept = None
-        if self.render_view == "overlay" and self.render_mode == "rgb_array":
-            self.perceive()  # at every step, whether or not it is shown
         return observation
 
     def _image(self, view: str, qpos: FloatArray) -> ImageArray:

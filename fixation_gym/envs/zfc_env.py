@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -10,9 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 
-from fixation_gym.control import gaze, open_loop
-from fixation_gym.control.gaze import GazeGains
-from fixation_gym.control.open_loop import Manoeuvre, OpenLoopGains, Target
+from fixation_gym.control.open_loop import OpenLoopGains
 from fixation_gym.envs.arguments import checked_action, require_choice
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.scene import TABLE_HEIGHT
@@ -22,14 +19,13 @@ from fixation_gym.envs.zfc_observation import (
     proprio_vector,
     zfc_observation_space,
 )
-from fixation_gym.geometry.rigid import pose_to_matrix
-from fixation_gym.perception.body.grasp_axis import narrow_axis
-from fixation_gym.perception.percept import Percept
-from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
-from fixation_gym.types import FloatArray, Observation
+from fixation_gym.fixator import Fixator, FixatorGains, action_of
+from fixation_gym.perception.detection.box_tracker import BoxTracker
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.robot import MAX_LINEAR_SPEED
+from fixation_gym.types import Observation
 
-_GAZE = GazeGains()
-_OPEN_LOOP = OpenLoopGains(hold_seconds=3.0)
+_GAINS = FixatorGains(open_loop=OpenLoopGains(hold_seconds=3.0))
 
 
 def make_zfc_env(observation: str = "zfc", **arguments: Any) -> FixationPickZFC:
@@ -43,16 +39,6 @@ def make_zfc_env(observation: str = "zfc", **arguments: Any) -> FixationPickZFC:
         ValueError: for a value that is not allowed; the message says what is.
     """
     return FixationPickZFC(FixationPickEnv(**arguments), observation)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Moment:
-    """The last observation of the inner environment, and what follows from it."""
-
-    reading: Observation
-    T_base_cam: FloatArray
-    percept: Percept
-    distance_true_m: float
 
 
 class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np.ndarray]):
@@ -114,7 +100,8 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = zfc_observation_space(observation, (env.intrinsics.height, env.intrinsics.width))
         self._shown = observation
-        self._manoeuvre: Manoeuvre | None = None
+        detector = BoxTracker(env.intrinsics) if env.scenario.any_colour else None
+        self._fixator = Fixator(Perception(env.intrinsics, support_height_m=TABLE_HEIGHT, detector=detector), _GAINS)
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -130,9 +117,8 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
             from fixation_gym.envs.privileged_map import ObstacleDepth
 
             self._truth = ObstacleDepth(self._base.wrist_view, self._base.model)
-        self._manoeuvre = None
-        self._moment = self._take_in(observation, info)
-        return self._observation(), info
+        self._fixator.reset()
+        return self._observation(observation, info), info
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Run one control period.
@@ -141,54 +127,21 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
             ValueError: if the action has the wrong shape or holds NaN or infinity.
         """
         action = checked_action(action, 4)
-        now = self._moment
-        if self._manoeuvre is None and action[3] > 0.0 and now.percept.fixation.initialised:
-            self._manoeuvre = open_loop.begin_grasp(now.T_base_cam, _target(now), now.reading.time, _OPEN_LOOP)
-        if self._manoeuvre is not None:
-            twist = open_loop.manoeuvre_twist(self._manoeuvre, now.T_base_cam, _OPEN_LOOP)
-        else:
-            twist = _gazing_twist(action[:3] * MAX_LINEAR_SPEED, now)
-        twist = gaze.within_speed(twist)
-        gripper = open_loop.gripper_command(self._manoeuvre)
-        observation, reward, terminated, truncated, info = self.env.step(np.array([*twist / TWIST_LIMITS, gripper]))
-        self._moment = now = self._take_in(observation, info)
-        if self._manoeuvre is not None:
-            width, time = now.reading.gripper_width, now.reading.time
-            if now.percept.body is not None:
-                self._manoeuvre = open_loop.reaimed(self._manoeuvre, now.T_base_cam, _target(now), _OPEN_LOOP)
-            self._manoeuvre = open_loop.advance(self._manoeuvre, now.T_base_cam, width, time, _OPEN_LOOP)
-        return self._observation(), float(reward), terminated, truncated, info
+        command = self._fixator.steer(action[:3] * MAX_LINEAR_SPEED, grasp=bool(action[3] > 0.0))
+        observation, reward, terminated, truncated, info = self.env.step(action_of(command))
+        return self._observation(observation, info), float(reward), terminated, truncated, info
 
-    def _take_in(self, observation: dict[str, Any], info: dict[str, Any]) -> _Moment:
-        reading = Observation.from_dict(observation)
-        return _Moment(reading, pose_to_matrix(reading.camera_pose), self._base.perceive(), info["distance_true_m"])
-
-    def _observation(self) -> dict[str, Any]:
-        now = self._moment
-        stage = None if self._manoeuvre is None else self._manoeuvre.stage
+    def _observation(self, outer: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
+        """What the learner sees, for the observation and info of ``FixationPick-v0``."""
+        reading, fixator = Observation.from_dict(outer), self._fixator
+        self._base.percept = percept = fixator.look(reading, fresh=self._base.camera_on)
         observation: dict[str, Any] = {}
         if self._shown == "zfc":
-            observation["zfc_map"] = now.percept.zfc.cells[None].copy()
+            observation["zfc_map"] = percept.zfc.cells[None].copy()
         elif self._shown == "rgb":
-            observation["rgb"] = now.reading.rgb
+            observation["rgb"] = reading.rgb
         elif self._shown == "privileged":
-            observation["true_map"] = self._truth.nearer(self._base.data, now.distance_true_m)[None]
-        observation["fixation"] = fixation_vector(now.percept.fixation)
-        observation["proprio"] = proprio_vector(now.reading, now.T_base_cam, stage)
+            observation["true_map"] = self._truth.nearer(self._base.data, info["distance_true_m"])[None]
+        observation["fixation"] = fixation_vector(percept.fixation)
+        observation["proprio"] = proprio_vector(reading, fixator.T_base_cam, fixator.stage)
         return observation
-
-
-def _target(now: _Moment) -> Target:
-    return Target(now.percept.centre_base, now.percept.reach_towards(now.T_base_cam), TABLE_HEIGHT)
-
-
-def _gazing_twist(v: FloatArray, now: _Moment) -> FloatArray:
-    """Twist, shape (6,), for the velocity that the agent asks for, shape (3,), m/s."""
-    fixation, T_base_cam = now.percept.fixation, now.T_base_cam
-    v = np.array([*gaze.within_reach(v[:2], T_base_cam, fixation.point_base, _GAZE), v[2]])
-    if not fixation.initialised:
-        return np.array([*v, *gaze.searching_twist(now.reading.time, _GAZE)[3:]])
-    roll_error = gaze.levelling(T_base_cam, _GAZE)
-    if fixation.distance_m < _GAZE.align_distance and now.percept.segmentation.whole:
-        roll_error = narrow_axis(now.percept.segmentation.mask, gaze.roll(T_base_cam), _GAZE.max_roll)
-    return gaze.fixating_twist(v, fixation.centroid, fixation.distance_m, roll_error, _GAZE)

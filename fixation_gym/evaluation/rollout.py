@@ -123,6 +123,7 @@ def run_episode(
     while not (terminated or truncated):
         action = policy.act(obs)
         estimate = getattr(policy, "estimate", None)
+        _show_percept(env, policy)
         recorder.add(_sensed(env, obs), info, estimate)
         steps.append(_record(estimate, info))
         if on_frame is not None and filmed(len(steps) - 1):
@@ -193,6 +194,13 @@ def _sensed(env: gymnasium.Env, obs: Mapping[str, Any]) -> Mapping[str, Any]:
     """What the sensors read, also where the policy is shown something else."""
     base = env.unwrapped
     return base.sensed if isinstance(base, FixationPickEnv) else obs
+
+
+def _show_percept(env: gymnasium.Env, policy: Policy) -> None:
+    """Let the overlay draw what the policy perceived, if it says so; an agent's environment says it itself."""
+    base, percept = env.unwrapped, getattr(policy, "percept", None)
+    if isinstance(base, FixationPickEnv) and percept is not None:
+        base.percept = percept
 
 
 def _render(env: gymnasium.Env) -> NDArray[np.uint8]:

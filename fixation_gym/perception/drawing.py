@@ -24,12 +24,13 @@ _LEAST_SHOWN = 0.01
 """Share of the map that must be in front before its centre of mass is marked."""
 
 
-def draw_overlay(rgb: ImageArray, percept: Percept, scale: float = 1.0) -> ImageArray:
+def draw_overlay(rgb: ImageArray, percept: Percept | None, scale: float = 1.0) -> ImageArray:
     """Draw gaze cross, target outline, zero-flow evidence, its map as an inset and the distance.
 
     Args:
         rgb: the image of the percept, shape (H, W, 3).
-        percept: what perception made of it; the zero-flow test is one frame older than the image.
+        percept: what perception made of it; the zero-flow test is one frame older than the image. None: nothing is
+            known, and nothing is drawn.
         scale: size of the result relative to the image.
 
     Returns:
@@ -37,6 +38,8 @@ def draw_overlay(rgb: ImageArray, percept: Percept, scale: float = 1.0) -> Image
     """
     size = (round(rgb.shape[1] * scale), round(rgb.shape[0] * scale))
     canvas = cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC if scale > 1 else cv2.INTER_AREA)
+    if percept is None:
+        return np.asarray(canvas, np.uint8)
     canvas = _tint(np.asarray(canvas, np.uint8), percept)
     _draw_target(canvas, percept)
     _draw_cross(canvas)

@@ -40,14 +40,14 @@ class ResidualServo:
         """Forget the last episode."""
         self.servo.reset(seed)
 
-    def look(self, reading: Observation, looking: bool = True) -> dict[str, NDArray[Any]]:
+    def look(self, reading: Observation, fresh: bool = True) -> dict[str, NDArray[Any]]:
         """Let the servo respond; returns what ``FixationPickZFC-v0`` would show.
 
         Args:
             reading: the observation of ``FixationPick-v0``.
-            looking: whether its image is new.
+            fresh: whether its image is new.
         """
-        self._command = self.servo.respond(reading, looking)
+        self._command = self.servo.respond(reading, fresh)
         self._T_base_cam = pose_to_matrix(reading.camera_pose)
         stage = _STAGES.get(self.phase)
         return {

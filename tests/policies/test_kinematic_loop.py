@@ -29,8 +29,8 @@ def picture(T_base_cam):
     return np.where(hit[..., None], np.array([200, 10, 10]), 128).astype(np.uint8)
 
 
-def run(policy, T_base_cam, seconds, visible=lambda time: True, settings=None):
-    perception, twist, trail = Perception(INTRINSICS, settings), np.zeros(6), []
+def run(policy, T_base_cam, seconds, visible=lambda time: True):
+    twist, trail = np.zeros(6), []
     for k in range(round(seconds / PERIOD)):
         time = k * PERIOD
         image = picture(T_base_cam) if visible(time) else np.full((120, 160, 3), 128, np.uint8)
@@ -43,7 +43,7 @@ def run(policy, T_base_cam, seconds, visible=lambda time: True, settings=None):
             camera_twist=twist,
             gripper_width=0.08 if policy.estimate is None or policy.estimate.phase != "lift" else 0.05,
         )
-        twist = policy.command(perception.update(observation), observation).camera_twist
+        twist = policy.respond(observation).camera_twist
         trail.append((time, policy.estimate, T_base_cam, twist))
         T_base_cam = T_base_cam @ exp_twist(twist, PERIOD)
     return trail
