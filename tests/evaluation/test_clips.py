@@ -21,7 +21,7 @@ CONFIG = EvaluationConfig(scenarios=("clear",), episodes=4)
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(workers, "make_env", lambda cell, render_mode: FakeEnv())
-    monkeypatch.setattr(workers, "make_policy", lambda name, env: FakePolicy())
+    monkeypatch.setattr(workers, "make_policy", lambda name, env, detector=None: FakePolicy())
     evaluate(CONFIG, tmp_path, run_fake_cell)
     return tmp_path
 

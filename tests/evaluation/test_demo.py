@@ -31,7 +31,7 @@ def use_fakes(monkeypatch: pytest.MonkeyPatch) -> list[FakeEnv]:
         return made[-1]
 
     monkeypatch.setattr(workers, "make_env", make_env)
-    monkeypatch.setattr(workers, "make_policy", lambda name, env: FakePolicy())
+    monkeypatch.setattr(workers, "make_policy", lambda name, env, detector=None: FakePolicy())
     return made
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_kinematic_loop import INTRINSICS, START, TARGET, run
 
+from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import TOOL_IN_CAMERA
@@ -29,16 +30,16 @@ def test_a_variant_differs_from_the_full_servo(name: str) -> None:
 
 
 def test_a_policy_has_the_settings_of_its_variant() -> None:
-    env = SimpleNamespace(unwrapped=SimpleNamespace(intrinsics=Intrinsics.from_fovy(32, 32, 0.7)))
-    policy = make_policy("servo:no_feed_forward", env)
+    env = SimpleNamespace(intrinsics=Intrinsics.from_fovy(32, 32, 0.7), scenario=SCENARIOS["clear"])
+    policy = make_policy("servo:no_feed_forward", SimpleNamespace(unwrapped=env))
     assert isinstance(policy, ServoPolicy)
     assert policy.gains == servo_variant("servo:no_feed_forward").gains
 
 
 def test_without_poses_the_fixation_constraint_leads_the_hand_to_the_target() -> None:
     variant = servo_variant("servo:hard_filter")
-    policy = ServoPolicy(Perception(INTRINSICS), variant.gains)
-    trail = run(policy, START, 14.0, settings=variant.perception)
+    policy = ServoPolicy(Perception(INTRINSICS, variant.perception), variant.gains)
+    trail = run(policy, START, 14.0)
     _, estimate, T_base_cam, _ = next(item for item in trail if item[1].phase == "approach")
     true = T_base_cam[:3, 2] @ (TARGET - T_base_cam[:3, 3])
     assert estimate.distance_m == pytest.approx(true, rel=0.1)

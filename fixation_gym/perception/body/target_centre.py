@@ -41,7 +41,7 @@ class CentreSettings:
     contradiction_px: float = 3.0
     """A tangent that is seen by this farther out than the body reaches contradicts it, one farther in is covered ..."""
     contradiction_m: float = 0.003
-    """... if it is by this much, too, m: no body is exactly of the fitted kind, which many pixels show close by."""
+    """... the former if by this much, too, m: no body is exactly of the fitted kind, which many pixels show close by."""
     moved_share: float = 0.1
     """If this share of an outline contradicts the body, that has moved, or is another one ..."""
     moved_frames: int = 3
@@ -117,15 +117,16 @@ def with_outline(
     newest = outline_of(seen.mask, intrinsics, T_base_cam, depth)
     if (expected := known.body) is not None:
         excess = misfit(expected, newest, support_height)
-        limit = max(settings.contradiction_px, settings.contradiction_m / (newest.pixel * depth))
-        if np.count_nonzero(excess < -limit) > settings.moved_share * TANGENTS:
+        least = max(settings.contradiction_px, settings.contradiction_m / (newest.pixel * depth))
+        covered = excess >= settings.contradiction_px
+        if np.count_nonzero(excess < -least) > settings.moved_share * TANGENTS:
             ray = T_base_cam[:3, :3] @ np.array([*fixation.centroid, 1.0])
             return _contradicted(known, expected, newest, ray, support_height, settings)
-        short_from = _short_from(known, expected, newest, excess >= limit, settings)
+        short_from = _short_from(known, expected, newest, covered, settings)
         known = replace(known, contradictions=0, short_from=short_from)
         if short_from is not None and _turned(expected, newest, short_from) > settings.parted_turn:
             return TargetBody((newest,))
-        newest = replace(newest, normals=newest.normals[excess < limit])
+        newest = replace(newest, normals=newest.normals[~covered])
     if len(newest.normals) < TANGENTS / 2:
         doubts = known.doubts + 1
         return replace(known, doubts=doubts) if doubts < settings.doubts else TargetBody()
