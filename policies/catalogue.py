@@ -143,6 +143,7 @@ def make_policy(name: str, env: Any, detector: str | None = None) -> Policy:
         variant.perception,
         support_height_m=TABLE_HEIGHT,
         detector=_detector(detector, variant, env.unwrapped)(intrinsics),
+        estimator=None if variant.estimator is None else variant.estimator(),
     )
     return ServoPolicy(perception, variant.gains, variant.memory, variant.avoid_obstacles)
 

@@ -15,13 +15,10 @@ from fixation_gym.perception.body.target_centre import TargetBody, with_outline
 from fixation_gym.perception.body.upright_body import UprightBody
 from fixation_gym.perception.detection.colour import ColourDetector, segment
 from fixation_gym.perception.detection.detector import Detector, detected
-from fixation_gym.perception.detection.segmentation import Segmentation
 from fixation_gym.perception.detection.tracking import Track, expected_at, followed
-from fixation_gym.perception.distance import pose_filter as distance
-from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze
-from fixation_gym.perception.distance.following import Frame, follow_constraint, follow_poses, mean_variance, mended
-from fixation_gym.perception.distance.pose_filter import DistanceState, Fixation
-from fixation_gym.perception.distance.target_motion import InverseDepth, contradiction, target_inverse_depth
+from fixation_gym.perception.distance.estimator import DistanceEstimator, PoseEstimator, inverse_distance
+from fixation_gym.perception.distance.following import Frame
+from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.flow.gradients import FlowSettings
 from fixation_gym.perception.flow.optic_flow import (
@@ -40,17 +37,12 @@ from fixation_gym.perception.zero_flow.zero_flow import (
     ZeroFlow,
     ZeroFlowSettings,
     unknown_zero_flow,
-    widened_on_grid,
     zero_flow_test,
 )
-from fixation_gym.types import FloatArray, MaskArray, Observation
+from fixation_gym.types import MaskArray, Observation
 
-_OWN_DEPTHS = 5
-"""Frames over which the motion of the target's own pixels is believed."""
 _HIDDEN_S = 1.0
 """After this time out of sight the target's body may be anywhere, s."""
-_COVERED_S = 1.0
-"""For this time after something covered or uncovered the target its centroid is not to be trusted, s."""
 
 
 class Perception:
@@ -63,6 +55,7 @@ class Perception:
         self_mask: MaskArray | None = None,
         support_height_m: float | None = None,
         detector: Detector | None = None,
+        estimator: DistanceEstimator | None = None,
     ) -> None:
         """Prepare for a camera.
 
@@ -72,6 +65,7 @@ class Perception:
             self_mask: pixels where the camera sees the robot itself, shape (H, W); never obstacles.
             support_height_m: height of the table in base, m; its surface is no obstacle. None: unknown.
             detector: says which pixels are the target; None: those of the colour in ``settings``.
+            estimator: says how far the target is; None: poses and centroids, with ``settings.distance``.
 
         Raises:
             ValueError: if ``self_mask`` has not the size of the images.
@@ -84,6 +78,7 @@ class Perception:
         self._self_mask = None if self_mask is None else np.array(self_mask, dtype=np.bool_)
         self.support_height_m = support_height_m
         self._detector: Detector = detector or ColourDetector(intrinsics, self._settings.colour)
+        self._estimator: DistanceEstimator = estimator or PoseEstimator(self._settings.distance)
         halvings = 0
         while intrinsics.width > self._settings.flow.max_width * 2**halvings:
             halvings += 1
@@ -101,11 +96,8 @@ class Perception:
     def forget_place(self) -> None:
         """Forget where the target is, but not what it looks like: it was pushed or dropped."""
         self._frames: deque[Frame] = deque(maxlen=3)
-        self._state: DistanceState | None = None
-        self._constrained: ConstrainedGaze | None = None
+        self._estimator.reset()
         self._track: Track | None = None
-        self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
-        self._covered_time = -math.inf
         self._body = TargetBody()
         self._seen_time = -math.inf
 
@@ -126,14 +118,13 @@ class Perception:
         segmentation = detected(self._detector, observation, expected, self._intrinsics)
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         frame = Frame(observation.time, grey, T_base_cam, observation.camera_twist, segmentation)
-        self._follow(frame)
+        self._estimator.add_frame(frame)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
-            self._own_depths.clear()
         self._frames.append(frame)
         flow = self._flow()
         zero_flow = self._look_for_obstacles(flow)
-        fixation = self._fixation(T_base_cam, segmentation)
+        fixation = self._estimator.fixation(T_base_cam, segmentation)
         if segmentation.visible:
             self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
@@ -152,28 +143,10 @@ class Perception:
             last = self._frames[-1].time
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
 
-    def _follow(self, now: Frame) -> None:
-        """Advance the distance filter to now."""
-        settings = self._settings
-        before = self._frames[-1] if self._frames else None
-        if settings.constraint is None:
-            self._state, covering = follow_poses(self._state, before, now, settings.distance)
-            self._covered_time = now.time if covering else self._covered_time
-            return
-        self._state, self._constrained = follow_constraint(
-            self._state, self._constrained, before, now, settings.distance, settings.constraint
-        )
-
-    def _fixation(self, T_base_cam: FloatArray, seen: Segmentation) -> Fixation:
-        settings = self._settings.distance
-        if not seen.visible:
-            return distance.fixation_at(self._state, T_base_cam, settings)
-        return distance.fixation_at(self._state, T_base_cam, settings, seen.centroid, mean_variance(seen))
-
     def _fit_body(self, now: Frame, fixation: Fixation) -> UprightBody | None:
         """The target's body, with the outline of this frame."""
         settings, height = self._settings.centre, self.support_height_m
-        if settings is None or height is None or self._settings.constraint is not None:
+        if settings is None or height is None:
             return None
         seen, T_base_cam = now.segmentation, now.T_base_cam
         self._body = with_outline(self._body, seen, fixation, self._intrinsics, T_base_cam, height, settings)
@@ -181,58 +154,37 @@ class Perception:
         hidden = now.time - self._seen_time > _HIDDEN_S
         return None if hidden else self._body.believed(T_base_cam, settings)
 
-    def _inverse_distance(self, T_base_cam: FloatArray) -> InverseDepth:
-        """Of the fixated object for a camera; 0 before it was seen."""
-        if self._state is None:
-            return 0.0, 0.0
-        depth, std, _ = distance.distance_at(self._state, T_base_cam, self._settings.distance)
-        return 1.0 / depth, std / depth**2
-
     def _flow(self) -> Flow:
         """Flow at the middle one of the last three frames."""
         if len(self._frames) < 3:
             return invalid_flow(self._frames[0].time, self._working)
         first, middle, last = self._frames
-        inverse_distance, _ = self._inverse_distance(middle.T_base_cam)
+        fixated, _ = inverse_distance(self._estimator, middle.T_base_cam)
         outer = (inverse(frame.T_base_cam) @ middle.T_base_cam for frame in (first, last))
-        to_first, to_last = (plane_homography(T, inverse_distance, self._working) for T in outer)
+        to_first, to_last = (plane_homography(T, fixated, self._working) for T in outer)
         return estimate_flow(
             [frame.grey for frame in self._frames],
             [frame.time for frame in self._frames],
             self._working,
             (to_first, to_last),
-            inverse_distance,
+            fixated,
             self._settings.flow,
             self._scratch,
         )
 
     def _look_for_obstacles(self, flow: Flow) -> ZeroFlow:
-        """Zero-flow test where the flow is, with the distance mended first."""
+        """Zero-flow test where the flow is, after the distance has heard of the flow."""
         shape = flow.overlap.shape
         if not flow.valid:
             return unknown_zero_flow(*shape)
         first, middle, last = self._frames
         if not (middle.segmentation.visible and last.segmentation.visible):
-            self._own_depths.clear()
             return unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
-        if self._settings.constraint is None:  # the constraint takes no distance from the centroid that could be wrong
-            self._mend(flow, twist)
-        gaze = Gaze(twist, *self._inverse_distance(middle.T_base_cam), middle.segmentation.mask, middle.T_base_cam)
+        self._estimator.add_flow(flow, (first, middle, last))
+        fixated = inverse_distance(self._estimator, middle.T_base_cam)
+        gaze = Gaze(twist, *fixated, middle.segmentation.mask, middle.T_base_cam)
         return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
-
-    def _mend(self, flow: Flow, twist: FloatArray) -> None:
-        """Begin the distance anew if the target's own motion contradicts what its centroid says."""
-        _, middle, last = self._frames
-        target = widened_on_grid(middle.segmentation.mask, flow.overlap.shape, 0)
-        # None takes a place, too: what the motion said long ago is about another distance.
-        self._own_depths.append(target_inverse_depth(flow, twist, target))
-        recent = [own for own in self._own_depths if own is not None]
-        covered = last.time - self._covered_time < _COVERED_S
-        own = contradiction(self._inverse_distance(middle.T_base_cam), recent, covered)
-        if own is not None:
-            self._state = mended(own, middle, last, self._settings.distance)
-            self._own_depths.clear()
 
 
 @lru_cache(maxsize=1)

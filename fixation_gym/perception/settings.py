@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from fixation_gym.perception.body.target_centre import CentreSettings
 from fixation_gym.perception.detection.colour import RED, Colour
 from fixation_gym.perception.detection.tracking import TrackingSettings
-from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.perception.flow.gradients import FlowSettings
 from fixation_gym.perception.zero_flow.zero_flow import ZeroFlowSettings
@@ -24,13 +23,9 @@ class PerceptionSettings:
     flow: FlowSettings = field(default_factory=FlowSettings)
     """Resolution, windows and noise of the flow."""
     distance: DistanceSettings = field(default_factory=DistanceSettings)
-    """Prior, noise and gates of the distance filter."""
-    constraint: ConstraintSettings | None = None
-    """If given, the distance comes from the paper's fixation constraint on the measured twist, for comparison; neither
-    poses and centroids nor the target's own motion have a say in it."""
+    """Prior, noise and gates of the distance filter, unless an estimator is given."""
     centre: CentreSettings | None = field(default_factory=CentreSettings)
-    """How the centre of the target's body is found; None: the fixated point is taken for it. Needs a support height,
-    and is left out with ``constraint``."""
+    """How the centre of the target's body is found; None: the fixated point is taken for it. Needs a support height."""
     zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
     """Margins and gates of the zero-flow test."""
     max_gap_s: float = 0.15

@@ -12,9 +12,10 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.detection.colour import ColourDetector
 from fixation_gym.perception.detection.detector import Detector
 from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
-from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
+from fixation_gym.perception.distance.estimator import DistanceEstimator, TwistEstimator
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.evidence_map import ZeroFlowSettings
+from fixation_gym.perception.zero_flow.front_rule import dot_product_rule
 from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings
 from policies.servo.gains import ServoGains
 
@@ -32,6 +33,8 @@ class ServoVariant:
     memory: MemorySettings = field(default_factory=MemorySettings)
     detector: Callable[[Intrinsics], Detector] | None = None
     """Makes its detector; None: the default."""
+    estimator: Callable[[], DistanceEstimator] | None = None
+    """Makes what tells its distance; None: poses and centroids."""
     avoid_obstacles: bool = True
     """False takes its map away: it comes in along its first line of sight."""
 
@@ -63,12 +66,13 @@ VARIANTS: tuple[ServoVariant, ...] = (
     ServoVariant(
         "servo:dot_product",
         "the exact zero-flow test: the paper's dot-product rule tells front from behind",
-        perception=PerceptionSettings(zero_flow=ZeroFlowSettings(rule="dot_product")),
+        perception=PerceptionSettings(zero_flow=ZeroFlowSettings(rule=dot_product_rule)),
     ),
     ServoVariant(
         "servo:hard_filter",
         "distance from poses: the paper's fixation constraint on the measured twist gives it",
-        perception=PerceptionSettings(constraint=ConstraintSettings()),
+        perception=PerceptionSettings(centre=None),
+        estimator=TwistEstimator,
     ),
     ServoVariant(
         "servo:no_tracking",

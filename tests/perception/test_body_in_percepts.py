@@ -5,7 +5,6 @@ import pytest
 from test_upright_body import CAMERA, TABLE, approach, mask_of, surface
 
 from fixation_gym.geometry.rigid import matrix_to_pose
-from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.types import Observation
@@ -59,7 +58,6 @@ def test_the_body_of_a_hidden_target_is_not_believed_for_long():
     [
         (None, None),
         (PerceptionSettings(centre=None), TABLE),
-        (PerceptionSettings(constraint=ConstraintSettings()), TABLE),
     ],
 )
 def test_without_table_or_by_choice_the_fixated_point_stands_in(settings, support_height):

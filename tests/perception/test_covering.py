@@ -5,8 +5,8 @@ import pytest
 from pinhole_scene import Scene, noise_texture, upright
 from test_pipeline_and_zero_flow import CAMERA, RED, TARGET, circling, frames
 
-from fixation_gym.perception import Perception, pipeline, segment
-from fixation_gym.perception.distance import following
+from fixation_gym.perception import Perception, segment
+from fixation_gym.perception.distance import estimator, following
 from fixation_gym.perception.distance.covering import slide
 
 
@@ -53,5 +53,5 @@ def largest_distance_error():
 def test_the_distance_holds_while_a_board_covers_most_of_the_target(monkeypatch):
     assert largest_distance_error() < 0.06
     monkeypatch.setattr(following, "slide", lambda *_: 0.0)
-    monkeypatch.setattr(pipeline, "contradiction", lambda *_: None)
+    monkeypatch.setattr(estimator, "contradiction", lambda *_: None)
     assert largest_distance_error() > 0.1  # what the centroid alone makes of it

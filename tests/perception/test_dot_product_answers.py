@@ -23,10 +23,11 @@ from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import Perception, PerceptionSettings, ZeroFlowSettings
 from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front, rule_answers
+from fixation_gym.perception.zero_flow.front_rule import dot_product_rule
 from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
 from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers
 
-RULE = PerceptionSettings(zero_flow=ZeroFlowSettings(rule="dot_product"))
+RULE = PerceptionSettings(zero_flow=ZeroFlowSettings(rule=dot_product_rule))
 MARGIN = RULE.zero_flow.depth_margin
 
 

@@ -10,12 +10,13 @@ from pinhole_scene import Scene, fixating_pose, noise_texture, observe, upright
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import Perception, PerceptionSettings
+from fixation_gym.perception.distance.estimator import TwistEstimator
 from fixation_gym.perception.distance.fixation_constraint import ConstraintSettings, advance, gaze_drift
 
 CAMERA = Intrinsics.from_fovy(96, 128, np.deg2rad(42.5))
 TARGET = np.array([0.35, 0.0, 0.0])
 DT = 0.04
-CONSTRAINED = PerceptionSettings(constraint=ConstraintSettings())
+CONSTRAINED = PerceptionSettings()
 SETTINGS = ConstraintSettings()
 STD = np.array([SETTINGS.velocity_std] * 3 + [SETTINGS.rate_std] * 3)
 BALL = upright(TARGET, 0.025, 0.025, noise_texture(2, (0.85, 0.08, 0.08), 0.2), round=True)
@@ -48,7 +49,7 @@ def follow(perception, ks, visible=True, rotation=1.0, rng=None):
 
 @pytest.mark.parametrize("rotation", [1.0, 1.1, 0.9])
 def test_the_distance_is_the_ratio_of_translation_and_rotation_whatever_the_poses_say(rotation):
-    fixation, depth = follow(Perception(CAMERA, CONSTRAINED), range(75), rotation=rotation)
+    fixation, depth = follow(Perception(CAMERA, CONSTRAINED, estimator=TwistEstimator()), range(75), rotation=rotation)
     assert fixation.distance_m == pytest.approx(depth / rotation, rel=0.02)
     np.testing.assert_allclose(fixation.point_base[1:], TARGET[1:], atol=0.01)
 
@@ -57,14 +58,14 @@ def test_noisy_twists_give_the_distance_within_the_stated_error():
     errors = []
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        fixation, depth = follow(Perception(CAMERA, CONSTRAINED), range(75), rng=rng)
+        fixation, depth = follow(Perception(CAMERA, CONSTRAINED, estimator=TwistEstimator()), range(75), rng=rng)
         assert fixation.distance_std_m < 0.03 * depth
         errors.append((fixation.distance_m - depth) / fixation.distance_std_m)
     assert np.mean(np.square(errors)) < 4.0
 
 
 def test_a_hidden_target_stays_where_it_was_and_the_filter_goes_on_from_there():
-    perception = Perception(CAMERA, CONSTRAINED)
+    perception = Perception(CAMERA, CONSTRAINED, estimator=TwistEstimator())
     before, _ = follow(perception, range(60))
     hidden, depth = follow(perception, range(60, 75), visible=False)
     assert not hidden.visible
@@ -77,7 +78,7 @@ def test_a_hidden_target_stays_where_it_was_and_the_filter_goes_on_from_there():
 
 
 def test_an_estimate_beyond_reach_begins_anew_and_comes_back():
-    perception = Perception(CAMERA, CONSTRAINED)
+    perception = Perception(CAMERA, CONSTRAINED, estimator=TwistEstimator())
     follow(perception, range(25))
     lost, _ = follow(perception, range(25, 50), rotation=0.0)  # translation without rotation: infinitely far
     assert lost.distance_m == pytest.approx(CONSTRAINED.distance.initial_distance_m, rel=0.2)

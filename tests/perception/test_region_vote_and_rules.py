@@ -11,7 +11,7 @@ from test_pipeline_and_zero_flow import CAMERA, POSTERS, TARGET, circling, frame
 
 from fixation_gym.geometry.interaction import fixation_coupling, image_flow
 from fixation_gym.geometry.twist import mean_twist
-from fixation_gym.perception import pipeline
+from fixation_gym.perception.distance import estimator
 from fixation_gym.perception.distance.target_motion import contradiction, target_inverse_depth
 from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front
 from fixation_gym.perception.zero_flow.region_vote import Side, VoteSettings, decide, region_votes
@@ -97,7 +97,7 @@ def test_the_distance_from_the_centroid_holds_unless_the_motion_contradicts_it_o
 @pytest.mark.parametrize("v_z", [0.0, 0.05])
 def test_a_target_that_nothing_covers_never_restarts_the_distance(v_z, monkeypatch):
     restarts = []
-    monkeypatch.setattr(pipeline, "mended", lambda *given: restarts.append(given))
+    monkeypatch.setattr(estimator, "mended", lambda *given: restarts.append(given))
     scene = Scene([r for number, r in enumerate(poster_scene().rectangles) if number < 2])
     run(frames(scene, partial(circling, v_z=v_z)), 40)
     assert not restarts

@@ -41,7 +41,7 @@ class CentreSettings:
     contradiction_px: float = 3.0
     """A tangent that is seen by this farther out than the body reaches contradicts it, one farther in is covered ..."""
     contradiction_m: float = 0.003
-    """... the former if by this much, too, m: no body is exactly of the fitted kind, which many pixels show close by."""
+    """... the former if by this much, too, m: close by, many pixels show that no body is exactly of the fitted kind."""
     moved_share: float = 0.1
     """If this share of an outline contradicts the body, that has moved, or is another one ..."""
     moved_frames: int = 3

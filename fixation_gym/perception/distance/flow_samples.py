@@ -131,6 +131,20 @@ def _edge_points(mask: ImageArray, rng: np.random.Generator) -> FloatArray | Non
     return np.column_stack([columns[chosen], rows[chosen]]).astype(np.float64)
 
 
+def edge_samples(flow: Flow, target: MaskArray, rng: np.random.Generator) -> FlowSamples | None:
+    """Samples of a flow at random edge points of the target; None if it has hardly any.
+
+    Args:
+        flow: of the whole image.
+        target: its pixels at the time of the flow, shape (H, W).
+        rng: chooses the points.
+    """
+    grid = flow.intrinsics
+    height, width = flow.overlap.shape
+    points = _edge_points(_resized(target.view(np.uint8), 2 * width, 2 * height, cv2.INTER_NEAREST), rng)
+    return None if points is None else _at_grid(flow, grid, points, 1.0 / (grid.fx * 2.0 * flow.period))
+
+
 def _gradient_samples(
     frames: tuple[CutOut, CutOut, CutOut],
     images: Sequence[ImageArray],

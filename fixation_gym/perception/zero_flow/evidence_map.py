@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -11,9 +10,9 @@ import numpy as np
 from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.scratch import Float32Array, fill
 from fixation_gym.perception.zero_flow import pixel_kernels
+from fixation_gym.perception.zero_flow.front_rule import FrontRule, exact_rule
 from fixation_gym.types import ImageArray, MaskArray
 
-Rule = Literal["exact", "dot_product"]
 CELLS = 32
 """Cells along each side of the map."""
 UNKNOWN = 128
@@ -24,8 +23,8 @@ UNKNOWN = 128
 class ZeroFlowSettings:
     """Margins and gates of the test."""
 
-    rule: Rule = "exact"
-    """What tells front from behind: the exact test, or the paper's dot product, for comparison."""
+    rule: FrontRule = exact_rule
+    """What tells front from behind: the exact test, the paper's dot product for comparison, or one's own."""
     depth_margin: float = 0.05
     """An obstacle's inverse depth exceeds the fixated one by this share at least."""
     height_margin_m: float = 0.015

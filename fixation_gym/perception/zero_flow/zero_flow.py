@@ -22,9 +22,8 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.interaction import epipolar_direction
 from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.scratch import Float32Array, fill
-from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front, rule_answers
 from fixation_gym.perception.zero_flow.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
-from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQuestion, pixel_answers
+from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQuestion
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 _DECIDED = 0.95
@@ -108,7 +107,7 @@ def zero_flow_test(
     if self_mask is not None:
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
-    answers = _answers(flow, usable, question, gaze, settings)
+    answers = settings.rule(flow, usable, question, gaze.twist, gaze.inverse_distance, settings.depth_margin)
     if gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance:
         _leave_the_decided(answers)
     outline = _outline(answers, gaze.inverse_distance, settings)
@@ -134,17 +133,6 @@ def _leave_the_decided(answers: PixelAnswers) -> None:
     fill(answers.p_nearer, 0.5, undecided)
     fill(answers.inverse_depth, np.nan, undecided)
     np.logical_and(answers.supported, ~undecided, out=answers.supported)
-
-
-def _answers(
-    flow: Flow, usable: MaskArray, question: PixelQuestion, gaze: Gaze, settings: ZeroFlowSettings
-) -> PixelAnswers:
-    """Answers by the exact test or by the paper's rule; the latter knows no depth, but heights still tell the table."""
-    if settings.rule == "exact":
-        return pixel_answers(flow, usable, question)
-    above = pixel_answers(flow, usable, question._replace(boundary=np.float32(-np.inf)))
-    front = dot_product_front(flow, gaze.twist)
-    return rule_answers(above, front, gaze.inverse_distance, settings.depth_margin)
 
 
 def _outline(answers: PixelAnswers, fixated: float, settings: ZeroFlowSettings) -> MaskArray:
