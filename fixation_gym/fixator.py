@@ -33,6 +33,8 @@ class FixatorGains:
     """Of gaze, roll and reach."""
     open_loop: OpenLoopGains = field(default_factory=OpenLoopGains)
     """Of grasp, lift and recovery."""
+    limit_reach: bool = True
+    """Whether lateral motion that leads out of the arm's reach is dropped."""
 
 
 class Fixator:
@@ -128,6 +130,8 @@ class Fixator:
     def within_reach(self, v: FloatArray) -> FloatArray:
         """Velocity, shape (3,), without the lateral part that would lead out of the arm's reach."""
         fixation, limits = self.percept.fixation, self.gains.gaze
+        if not self.gains.limit_reach:
+            return v
         return np.array([*gaze.within_reach(v[:2], self.T_base_cam, fixation.point_base, limits), v[2]])
 
     def search(self, seconds: float) -> Command:

@@ -18,6 +18,7 @@ from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.pipeline import Perception
 from policies.base import Policy
 from policies.baselines import RandomPolicy
+from policies.paper import PAPER_NAMES, paper_variant
 from policies.rl.agent_file import read_card
 from policies.rl.config import CONFIGS, require_learning_packages
 from policies.servo.servo_policy import ServoPolicy
@@ -25,7 +26,10 @@ from policies.servo.variants import VARIANT_NAMES, ServoVariant, servo_variant
 from policies.strangers import is_class_name, load_class, source_hash
 
 AGENT_SUFFIX = ".zip"
-POLICY_NAMES = ("servo", "blind", "random", "oracle", *(name for name in VARIANT_NAMES if ":" in name))
+POLICY_NAMES = (
+    *("servo", "blind", "random", "oracle", "paper"),
+    *(name for name in (*VARIANT_NAMES, *PAPER_NAMES) if ":" in name),
+)
 DETECTORS: dict[str, Callable[[Intrinsics], Detector]] = {
     "colour": ColourDetector,
     "mean_shift": MeanShiftDetector,
@@ -133,10 +137,12 @@ def make_policy(name: str, env: Any, detector: str | None = None) -> Policy:
         from policies.oracle import OraclePolicy
 
         return OraclePolicy(env.unwrapped)
-    if name not in VARIANT_NAMES:
+    if name not in POLICY_NAMES:
         return load_class(name, "--policy", _POLICY_METHODS)(env.unwrapped)
     from fixation_gym.envs.scene import TABLE_HEIGHT
 
+    if name in PAPER_NAMES:
+        return paper_variant(name).policy(env.unwrapped.intrinsics, TABLE_HEIGHT)
     variant, intrinsics = servo_variant(name), env.unwrapped.intrinsics
     perception = Perception(
         intrinsics,

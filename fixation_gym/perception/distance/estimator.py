@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +20,7 @@ from fixation_gym.perception.detection.segmentation import Segmentation
 from fixation_gym.perception.distance import calibrating_filter, flow_filters, pose_filter
 from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
 from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze, ConstraintSettings, gaze_drift
-from fixation_gym.perception.distance.flow_filters import FlowFilterState, Kind
+from fixation_gym.perception.distance.flow_filters import FlowFilterState, FlowSamples, Kind
 from fixation_gym.perception.distance.flow_samples import edge_samples
 from fixation_gym.perception.distance.following import (
     Frame,
@@ -207,9 +208,10 @@ class FlowEstimator:
 
     def add_flow(self, flow: Flow, frames: Frames) -> None:
         """Take in flow on the target's edges with the twist of the same frame."""
-        self._absorb(frames[1], edge_samples(flow, frames[1].segmentation.mask, self._rng))
+        samples = edge_samples(flow, frames[1].segmentation.mask, self._rng)
+        self._absorb(frames[1], None if samples is None else _doubted(samples))
 
-    def _absorb(self, frame: Frame, samples: flow_filters.FlowSamples | None) -> None:
+    def _absorb(self, frame: Frame, samples: FlowSamples | None) -> None:
         if self._filter is None or not frame.segmentation.visible or frame.time <= self._filter_time:
             return
         constraint = self._constraint
@@ -236,6 +238,15 @@ class FlowEstimator:
         visible = self._filter is not None and last is not None and last.segmentation.visible
         state = self._anchored(last) if visible and last is not None else self._hidden
         return _described(state, T_base_cam, seen, self._settings)
+
+
+def _doubted(samples: FlowSamples) -> FlowSamples:
+    """Samples that count the less the faster the target as a whole moves in the image: then it is not fixated."""
+    finite = np.isfinite(samples.flow).all(axis=1)
+    if not finite.any():
+        return samples
+    drift = np.median(samples.flow[finite], axis=0)
+    return replace(samples, cov=samples.cov + float(drift @ drift) * len(samples.flow) * np.eye(2))
 
 
 class CalibratingEstimator:
