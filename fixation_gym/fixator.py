@@ -21,6 +21,8 @@ from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robot import TWIST_LIMITS
 from fixation_gym.types import Command, FloatArray, Observation
 
+_LEAST_ROLL = 1e-3
+"""Range of the roll that is always left, rad."""
 _FAR_OFF = 0.5
 """Offset from the image centre beyond which the direction to the target is all that counts, normalised coordinates."""
 
@@ -147,7 +149,8 @@ class Fixator:
         percept, gains = self.percept, self.gains.gaze
         if percept.fixation.distance_m >= gains.align_distance or not percept.segmentation.whole:
             return None
-        return narrow_axis(percept.segmentation.mask, gaze.roll(self.T_base_cam), gains.max_roll)
+        largest = min(gains.max_roll, open_loop.largest_roll(self.T_base_cam, self.target, self.gains.open_loop))
+        return narrow_axis(percept.segmentation.mask, gaze.roll(self.T_base_cam), max(largest, _LEAST_ROLL))
 
     def _gazing_twist(self, v: FloatArray, roll_error: float | None) -> FloatArray:
         fixation, gains = self.percept.fixation, self.gains.gaze

@@ -45,10 +45,16 @@ class OpenLoopGains:
     """In the grasp, how far the tool stays back per metre that it is off the approach axis."""
     funnel_length: float = 0.06
     """Largest distance that it stays back, m."""
-    tool_tolerance: float = 0.004
-    """Distance at which the tool has arrived, m."""
+    tool_tolerance: float = 0.0015
+    """Distance at which the tool has arrived, m: small balls slip out of fingers that close higher up ..."""
+    coarse_tolerance: float = 0.004
+    """... and the distance that is good enough ..."""
+    patience: float = 2.2
+    """... after this time: an arm that touches something may come no nearer, s."""
     grasp_height: float = 0.85
     """Height of the grasp above the support surface as a share of the point's: many things are widest below it."""
+    highest_grasp: float = 1.15
+    """Height up to which a turned hand may have to stay, as a share of the point's above the support surface."""
     finger_room: float = 0.002
     """Least height of the open fingers above the support surface, m."""
     finger_reach: tuple[float, float, float] = (0.050, 0.011, 0.010)
@@ -118,6 +124,27 @@ def begin_grasp(T_base_cam: FloatArray, target: Target, time: float, gains: Open
     return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA)
 
 
+def largest_roll(T_base_cam: FloatArray, target: Target, gains: OpenLoopGains) -> float:
+    """Largest roll against level, rad, with which the open fingers still come down to the grasp; at most a right angle.
+
+    Turned hands reach lower on one side, so they must stay higher: what is low slips out above its middle. Without a
+    support height or a known body nothing is known against turning.
+
+    Args:
+        T_base_cam: camera pose, shape (4, 4).
+        target: what to grasp.
+        gains: numbers of the manoeuvre.
+    """
+    if target.support_height is None or target.reach is None:
+        return math.pi / 2.0
+    flat, steep = math.hypot(T_base_cam[2, 0], T_base_cam[2, 1]), abs(float(T_base_cam[2, 2]))
+    rolls = np.linspace(0.0, math.pi / 2.0, 91)
+    along, across, ahead = gains.finger_reach
+    lowest = gains.finger_room + flat * (along * np.sin(rolls) + across * np.cos(rolls)) + steep * ahead
+    highest = gains.highest_grasp * (float(target.point[2]) - target.support_height)
+    return float(rolls[max(1, int(np.count_nonzero(np.maximum.accumulate(lowest) <= highest))) - 1])
+
+
 def reaimed(manoeuvre: Manoeuvre, T_base_cam: FloatArray, target: Target, gains: OpenLoopGains) -> Manoeuvre:
     """The grasp with a new goal if the target was pushed, or is known only now; other manoeuvres as they are."""
     if manoeuvre.stage is not Stage.GRASP:
@@ -155,7 +182,8 @@ def advance(
         gains: numbers of the manoeuvre.
     """
     seconds = time - manoeuvre.started
-    arrived = bool(np.linalg.norm(T_base_cam[:3, 3] - manoeuvre.goal) < gains.tool_tolerance)
+    tolerance = gains.tool_tolerance if seconds < gains.patience else gains.coarse_tolerance
+    arrived = bool(np.linalg.norm(T_base_cam[:3, 3] - manoeuvre.goal) < tolerance)
     empty = gripper_width < gains.empty_width
     if manoeuvre.stage is Stage.RECOVER:
         return None if arrived or seconds > gains.grasp_timeout else manoeuvre
