@@ -123,7 +123,7 @@ def test_without_an_image_size_the_rest_of_the_observation_is_the_same():
         env.reset(seed=1)
     action = np.array([0.2, 0.1, 0.3, 0.0, 0.1, 0.0, -1.0], np.float32)
     blind, seeing = (env.step(action)[0] for env in envs)
-    assert set(seeing) - set(blind) == {"rgb"}
+    assert set(seeing) - set(blind) == {"rgb", "target_box"}
     assert blind in envs[0].observation_space
     for key, value in blind.items():
         np.testing.assert_array_equal(value, seeing[key], err_msg=key)
