@@ -128,6 +128,7 @@ import numpy as np
 import fixation_gym.control.servo_laws
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception import Perception
+import fixation_gym.fixator, policies.paper
 from policies.servo.servo_policy import ServoPolicy
 camera = Intrinsics.from_fovy(96, 128, 0.7)
 policy = ServoPolicy(Perception(camera))

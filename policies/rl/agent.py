@@ -17,7 +17,7 @@ from stable_baselines3.sac.policies import MultiInputPolicy
 from fixation_gym.control.open_loop import Stage
 from fixation_gym.envs.zfc_observation import OBSERVATIONS
 from fixation_gym.errors import UsageError
-from fixation_gym.perception.pipeline import Perception
+from fixation_gym.perception.percept import Percept
 from fixation_gym.types import Observation
 from policies.base import Action, Estimate
 from policies.rl.agent_file import AgentCard, read_agent
@@ -89,18 +89,19 @@ class ResidualAgent:
         """Use a loaded network, and the servo that it was trained to help."""
         self.card = card
         self.estimate: Estimate | None = None
+        self.percept: Percept | None = None
         self._decider, self._servo = decider, ResidualServo(servo)
 
     def reset(self, seed: int | None = None) -> None:
         """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
         self._decider.reset()
         self._servo.reset(seed)
-        self.estimate = None
+        self.estimate = self.percept = None
 
     def act(self, obs: Mapping[str, Any]) -> Action:
         """Action of shape (7,)."""
         shown = self._servo.look(Observation.from_dict(obs))
-        self.estimate = self._servo.servo.estimate
+        self.estimate, self.percept = self._servo.servo.estimate, self._servo.servo.percept
         return self._servo.action(self._decider.act(shown))
 
 
@@ -121,10 +122,11 @@ def load_agent(path: Path, env: Any) -> Agent | ResidualAgent:
     decider = Decider(_network(path, card, observation, 2 if residual else 4, weights), 2 if residual else 4)
     if not residual:
         return Agent(card, decider)
-    from fixation_gym.envs.scene import TABLE_HEIGHT
+    from policies.catalogue import make_policy
 
-    perception = Perception(env.unwrapped.intrinsics, support_height_m=TABLE_HEIGHT)
-    return ResidualAgent(card, decider, ServoPolicy(perception))
+    servo = make_policy("servo", env)
+    assert isinstance(servo, ServoPolicy)
+    return ResidualAgent(card, decider, servo)
 
 
 def _check_observation(path: Path, card: AgentCard, observation: str, residual: bool, space: spaces.Dict) -> None:

@@ -11,6 +11,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import fixation_gym
+from fixation_gym.perception import Perception
+from fixation_gym.types import Observation
 
 pytestmark = pytest.mark.sim
 SMALL = (64, 80)
@@ -186,3 +188,18 @@ def test_human_mode_without_a_display_says_what_to_use(monkeypatch):
 
 def test_importing_the_package_registers_the_environment():
     assert fixation_gym.__name__ in gym.spec("FixationPick-v0").entry_point
+
+
+def test_the_overlay_draws_what_whoever_acts_perceived_and_nothing_without():
+    env = gym.make("FixationPick-v0", scenario="clear", render_mode="rgb_array", render_view="overlay")
+    obs, _ = env.reset(seed=1)
+    plain = env.render()
+    perception = Perception(env.unwrapped.intrinsics, support_height_m=-0.112)
+    env.unwrapped.percept = perception.update(Observation.from_dict(obs))
+    drawn = env.render()
+    env.reset(seed=1)
+    forgotten = env.render()
+    env.close()
+    assert np.any(drawn[:, :480] != plain[:, :480])
+    np.testing.assert_array_equal(drawn[:, 480:], plain[:, 480:])
+    np.testing.assert_array_equal(forgotten, plain)
