@@ -76,7 +76,7 @@ def colour_mask(rgb: ImageArray, intrinsics: Intrinsics, colour: Colour, expecte
     window = _search_window(rgb, colour)
     if window is not None:
         inside = _colour_mask(rgb, window, colour)
-        mask[window] = best_group(inside, colour.merge_gap_fraction, intrinsics, window, expected)
+        mask[window] = _best_group(inside, colour.merge_gap_fraction, intrinsics, window, expected)
     return mask.view(np.bool_)
 
 
@@ -181,7 +181,7 @@ def _colour_tables(colour: Colour) -> tuple[NDArray[np.int32], NDArray[np.int32]
     return least.astype(np.int32), hue_scale.astype(np.int32), in_range.astype(np.int32)
 
 
-def best_group(
+def _best_group(
     mask: ImageArray,
     merge_gap_fraction: float,
     intrinsics: Intrinsics,
