@@ -78,12 +78,14 @@ class Necessity:
     quick: bool = False
     """A few ways and four episodes: minutes, to see that everything works."""
     episodes: int | None = None
-    """Episodes per scenario and way, an even number, half to choose the best way and half to judge it; 40 by default, 4
-    with --quick."""
+    """Episodes per scenario, an even number, half to choose the best way and half to judge it; 40 by default, 4 with
+    --quick."""
     seed: int = 0
     """Chooses the block of episode seeds, as for evaluate."""
     agent: Path | None = None
     """An agent's zip, such as a trained blind one, to put beside the ways."""
+    evaluation: Path | None = None
+    """A folder that evaluate wrote with the same --seed, such as the servo's, to be paired with the best ways."""
     workers: int = 1
     """Number of processes."""
     out: Path = Path("out/necessity")
@@ -94,7 +96,9 @@ class Necessity:
         from fixation_gym.experiments.necessity.run import FIGURE_FILE, ROWS_FILE, TABLE_FILE, NecessityConfig, measure
 
         scenarios = split_names(self.scenario) if self.scenario else None
-        config = NecessityConfig(scenarios, self.quick, self.episodes, self.seed, self.agent, self.workers)
+        config = NecessityConfig(
+            scenarios, self.quick, self.episodes, self.seed, self.agent, self.evaluation, self.workers
+        )
         config.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE

@@ -22,7 +22,7 @@ from fixation_gym.control.reach import HIGHEST, LOWEST, REACH_GRID, azimuth_rang
 from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.statistics import wilson_interval
+from fixation_gym.evaluation.statistics import paired_difference_interval, wilson_interval
 from fixation_gym.experiments.necessity import run as necessity
 from fixation_gym.experiments.necessity.episodes import Outcome, play_in
 from fixation_gym.experiments.necessity.run import (
@@ -35,7 +35,7 @@ from fixation_gym.experiments.necessity.run import (
     run_cell,
     scenarios_with_obstacles,
 )
-from fixation_gym.experiments.necessity.statistics import format_table, summarise
+from fixation_gym.experiments.necessity.statistics import chosen_ways, format_table, summarise
 from fixation_gym.experiments.necessity.ways import ELEVATIONS, QUICK_WAYS, STRAIGHT, WAYS, azimuth_cells
 from fixation_gym.geometry.boxes import joined
 from policies import catalogue
@@ -131,13 +131,33 @@ def test_the_best_way_is_chosen_on_one_half_and_judged_on_the_other():
     (row,) = summary["table"]
     assert (row["best"], row["best_k"], row["best_n"], row["chosen_on_k"]) == ("b", 2, 10, 6)
     assert (row["best_low"], row["best_high"]) == wilson_interval(2, 10)
-    assert (row["hindsight"], row["hindsight_k"], row["hindsight_n"]) == ("a", 13, 20)
+    assert row["mean_rate"] == pytest.approx(16 / 30)
     assert (row["blind_k"], row["blind_n"], row["oracle_k"]) == (3, 20, 19)
     assert "agent_k" not in row
     assert {(r["member"], r["k"], r["n"], r["collisions"]) for r in summary["rows"]} >= {("a", 13, 20, 7)}
     text = format_table(summary["table"])
     assert "2/10  20% [6, 51]" in text
     assert "upper bound" in text
+
+
+def test_ways_are_chosen_by_scenario_and_for_all_at_once():
+    episodes = [*made_up("bin", {"a": (6, 9), "b": (5, 0)}), *made_up("opaque", {"a": (0, 9), "b": (4, 0)})]
+    even = [episode for episode in episodes if episode["seed"] % 2 == 0]
+    assert chosen_ways(even, ("a", "b")) == {"bin": ("a", "b"), "opaque": ("b",)}
+    only = [episode for episode in even if episode["scenario"] == "bin"]
+    assert chosen_ways(only, ("a", "b")) == {"bin": ("a",)}
+
+
+def test_an_evaluation_is_paired_with_the_best_way_on_the_odd_seeds():
+    episodes = made_up("bin", {"a": (6, 2), "b": (5, 9)})  # a: seeds 1 and 3 of the odd ones
+    evaluated = {("bin", seed): seed != 1 for seed in range(20)}
+    (row,) = summarise(episodes, ("a", "b"), evaluated)["table"]
+    assert (row["evaluated_k"], row["evaluated_n"]) == (9, 10)
+    assert row["difference"] == pytest.approx(0.7)
+    assert (row["difference_low"], row["difference_high"]) == paired_difference_interval(1, 8, 1, 0)
+    assert "+70 [" in format_table([row])
+    (row,) = summarise(episodes, ("a", "b"), {("opaque", 1): True})["table"]
+    assert "difference" not in row
 
 
 def test_one_way_for_all_scenarios_is_chosen_too_and_an_agent_has_its_column():
@@ -159,14 +179,22 @@ def fake_run(cell: dict[str, Any]) -> dict[str, Any]:
     return episode(cell["scenario"], cell["member"], cell["seed"], good)
 
 
+def read_lines(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
+
+
 def test_by_default_all_scenarios_with_obstacles_are_tried_with_all_ways():
     config = NecessityConfig()
     assert {"opaque", "bin", "moving_obstacle"} <= set(config.scenario_names)
     assert not {"clear", "moving_target", "distractor"} & set(config.scenario_names)
-    cells = config.cells()
-    members = len(WAYS) + 1 + len(config.policies())
-    assert len(cells) == members * 40 * len(scenarios_with_obstacles())
-    assert all(cell_key(cell) == key for key, cell in cells.items())
+    scenarios = len(scenarios_with_obstacles())
+    choosing = config.choosing()
+    assert len(choosing) == (len(WAYS) + 1) * 20 * scenarios
+    judging = config.judging({name: tuple(WAYS)[:2] for name in config.scenario_names})
+    assert len(judging) == (2 + 1 + len(config.policies())) * 20 * scenarios
+    assert all(cell_key(cell) == key for key, cell in [*choosing.items(), *judging.items()])
+    assert {seed % 2 for *_, seed in choosing} == {0}
+    assert {seed % 2 for *_, seed in judging} == {1}
     assert config.policies()["blind"] == "blind"
 
 
@@ -189,6 +217,7 @@ def test_another_agent_is_another_member(tmp_path: Path):
         (["--workers", "0"], "--workers must be at least 1"),
         (["--agent", "agent.txt"], "--agent must be an agent's .zip, got agent.txt"),
         (["--agent", "nowhere.zip"], "nowhere.zip"),
+        (["--evaluation", "nowhere"], "cannot read nowhere/run.json: it is missing"),
     ],
 )
 def test_bad_options_are_one_line_and_leave_no_folder(
@@ -217,7 +246,8 @@ def test_a_killed_run_resumes_without_losing_or_repeating(tmp_path: Path):
     summary = measure(CONFIG, tmp_path, lambda cell: calls.append(cell_key(cell)) or fake_run(cell))
     calls.remove(("killed", "", 0))
     assert summary["episodes_resumed"] == 9
-    assert sorted(calls) == sorted(CONFIG.cells())
+    assert len(calls) == len(set(calls)) == len(read_lines(tmp_path))
+    assert set(CONFIG.choosing()) < set(calls)
     assert summary["table"] == measure(CONFIG, tmp_path / "other", fake_run)["table"]
     measure(CONFIG, tmp_path, lambda cell: pytest.fail("nothing is left to do"))
     with pytest.raises(UsageError, match="seed 0 instead of 1"):
@@ -232,8 +262,9 @@ def test_the_folder_holds_summary_tables_and_figure(
     assert cli.main(["necessity", "--quick", "--scenario", "opaque,bin", "--out", str(tmp_path)]) == 0
     assert capsys.readouterr().out.startswith("scenario")
     summary = json.loads((tmp_path / "summary.json").read_text())
-    members = len(QUICK_WAYS) + 1 + len(CONFIG.policies())
-    assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == members * 2 * 4
+    lines = read_lines(tmp_path)
+    assert sum(line["seed"] % 2 == 0 for line in lines) == (len(QUICK_WAYS) + 1) * 2 * 2
+    assert all(row["best_n"] == 2 for row in summary["table"] if row["scenario"] != "all")
     for name, rows in ((ROWS_FILE, summary["rows"]), (TABLE_FILE, summary["table"])):
         with (tmp_path / name).open(newline="") as file:
             assert len(list(csv.DictReader(file))) == len(rows)

@@ -44,11 +44,11 @@ def draw_figure(path: Path, rows: Sequence[Mapping[str, Any]], table: Sequence[M
     FigureCanvasAgg(figure)
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(2.2 * lines, 0.8)).ravel()
     for part, row in zip(above.subfigures(lines, columns, squeeze=False).ravel(), panels, strict=False):
-        here = [item for item in rows if item["scenario"] == row["scenario"] and item["n"]]
-        _draw_panel(part, row, {item["member"]: item["k"] / item["n"] for item in here})
+        here = [item for item in rows if item["scenario"] == row["scenario"] and item["chosen_on_n"]]
+        _draw_panel(part, row, {item["member"]: item["chosen_on_k"] / item["chosen_on_n"] for item in here})
     scale = ScalarMappable(Normalize(0.0, 100.0 * _HIGHEST), _MAP)
     bar = below.colorbar(scale, cax=below.add_axes((0.25, 0.6, 0.5, 0.2)), orientation="horizontal", extend="max")
-    bar.set_label("success without collision of straight fast ways, % of all seeds", fontsize=8)
+    bar.set_label("success without collision of straight fast ways, % of the even seeds", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     figure.savefig(path, dpi=100)
 

@@ -6,7 +6,7 @@ import atexit
 import hashlib
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,8 +19,8 @@ from fixation_gym.evaluation.evaluate import SEED_BLOCK, EvaluationConfig, episo
 from fixation_gym.evaluation.files import write_csv, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.storage import EPISODES_FILE, SUMMARY_FILE, ResultStore, check_no_folders
-from fixation_gym.experiments.necessity.statistics import AGENT, summarise
+from fixation_gym.evaluation.storage import EPISODES_FILE, SUMMARY_FILE, EpisodeKey, ResultStore, check_no_folders
+from fixation_gym.experiments.necessity.statistics import AGENT, chosen_ways, summarise
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
@@ -51,6 +51,8 @@ class NecessityConfig:
     seed: int = 0
     agent: Path | None = None
     """An agent's zip to put beside the others."""
+    evaluation: Path | None = None
+    """Folder of an evaluation of the same block of seeds, to be paired with the best ways."""
     workers: int = 1
 
     def check(self) -> None:
@@ -74,6 +76,7 @@ class NecessityConfig:
             if self.agent.suffix != AGENT_SUFFIX:
                 raise UsageError(f"--agent must be an agent's {AGENT_SUFFIX}, got {self.agent}")
             check_policy(str(self.agent))
+        self.evaluated()
         workers.check_backend("loky", self.workers)
 
     @property
@@ -114,24 +117,56 @@ class NecessityConfig:
             "versions": installed_versions(),
         }
 
-    def cells(self) -> dict[Key, Cell]:
-        """All episodes. Ways: a seed's scenarios before the next seed, so that part of a run shows the whole.
+    def evaluated(self) -> dict[EpisodeKey, bool] | None:
+        """Success without collision of the evaluation by (scenario, seed); None without one.
 
-        All members meet a scene in a row, for drawing it may take longer than a way. The policies with images follow:
-        an environment of each scenario has to be built for them.
+        Raises:
+            UsageError: if the folder cannot be read, or is of other seeds.
         """
-        seeds = episode_seeds(self.seed, self.episode_count)
-        cells: dict[Key, Cell] = {}
-        for seed in seeds:
-            for scenario in self.scenario_names:
-                for member in (*self.ways, ORACLE):
-                    cells[scenario, member, seed] = {"scenario": scenario, "member": member, "seed": seed}
+        if self.evaluation is None:
+            return None
+        from fixation_gym.evaluation.folders import read_evaluation
+
+        read = read_evaluation(self.evaluation)
+        if read.run["seed"] != self.seed:
+            raise UsageError(
+                f"--evaluation must be of --seed {self.seed}, but {self.evaluation} is of seed {read.run['seed']}"
+            )
+        return {(result.scenario, result.seed): result.collision_free_success for result in read.results}
+
+    def choosing(self) -> dict[Key, Cell]:
+        """Episodes on which ways are chosen: all ways on the even seeds, and the oracle.
+
+        A seed's scenarios come before the next seed, so that part of a run shows the whole. All members meet a scene
+        in a row, for drawing it may take longer than a way.
+        """
+        seeds = episode_seeds(self.seed, self.episode_count)[::2]
+        members = {name: (*self.ways, ORACLE) for name in self.scenario_names}
+        return _cells(seeds, members)
+
+    def judging(self, chosen: Mapping[str, tuple[str, ...]]) -> dict[Key, Cell]:
+        """Episodes on the odd seeds: the chosen ways by scenario, the oracle, and the policies with images.
+
+        Those come last: an environment of each scenario has to be built for them.
+        """
+        seeds = episode_seeds(self.seed, self.episode_count)[1::2]
+        cells = _cells(seeds, {name: (*chosen[name], ORACLE) for name in self.scenario_names})
         for member, policy in self.policies().items():
-            for scenario in self.scenario_names:
-                for seed in seeds:
-                    cell = {"scenario": scenario, "member": member, "seed": seed, "policy": policy}
-                    cells[scenario, member, seed] = cell
+            with_images = _cells(seeds, {name: (member,) for name in self.scenario_names}, by_scenario=True)
+            cells |= {key: {**cell, "policy": policy} for key, cell in with_images.items()}
         return cells
+
+
+def _cells(seeds: Sequence[int], members: Mapping[str, Sequence[str]], by_scenario: bool = False) -> dict[Key, Cell]:
+    """Episodes of the members of every scenario, seed by seed or scenario by scenario."""
+    pairs = [(scenario, seed) for seed in seeds for scenario in members]
+    if by_scenario:
+        pairs.sort(key=lambda pair: list(members).index(pair[0]))
+    return {
+        (scenario, member, seed): {"scenario": scenario, "member": member, "seed": seed}
+        for scenario, seed in pairs
+        for member in members[scenario]
+    }
 
 
 def scenarios_with_obstacles() -> tuple[str, ...]:
@@ -226,30 +261,37 @@ def measure(config: NecessityConfig, out: Path, run: Callable[[Cell], dict[str, 
     from fixation_gym.experiments.necessity.figure import draw_figure
 
     started = time.monotonic()
-    cells = config.cells()
+    ways = tuple(config.ways)
+    evaluated = config.evaluated()
     store: ResultStore[Key, dict[str, Any]] = ResultStore(
         out, config.run_description(), EPISODES_FILE, key=cell_key, from_json=_checked, to_json=dict
     )
     with store:
         check_no_folders(out, (ROWS_FILE, TABLE_FILE, FIGURE_FILE))
-        resumed = run_missing(
-            store,
-            cells,
-            run,
-            parse=dict,
-            note=lambda value: f"{value['scenario']}, {value['member']}",
-            unit="episode",
-            processes=config.workers,
-        )
+
+        def episodes(cells: Mapping[Key, Cell]) -> tuple[list[dict[str, Any]], int]:
+            resumed = run_missing(
+                store,
+                cells,
+                run,
+                parse=dict,
+                note=lambda value: f"{value['scenario']}, {value['member']}",
+                unit="episode",
+                processes=config.workers,
+            )
+            return [store.finished[key] for key in cells], resumed
+
+        choosing, first = episodes(config.choosing())
+        judging, second = episodes(config.judging(chosen_ways(choosing, ways)))
         close_sims()
         workers.close_worlds()
         summary = {
-            **summarise([store.finished[key] for key in cells], tuple(config.ways)),
+            **summarise([*choosing, *judging], ways, evaluated),
             **config.run_description(),
             "ways": {name: asdict(way) for name, way in config.ways.items()},
             "quick": config.quick,
             "episodes": config.episode_count,
-            "episodes_resumed": resumed,
+            "episodes_resumed": first + second,
             "commit": source_commit(),
             "wall_s": time.monotonic() - started,
         }

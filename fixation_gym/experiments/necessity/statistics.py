@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fixation_gym.evaluation.statistics import wilson_interval
+from fixation_gym.evaluation.statistics import paired_difference_interval, wilson_interval
 
 Episode = Mapping[str, Any]
 """One line of ``episodes.jsonl``: scenario, member, seed, success (without collision), collision, time_s, phase."""
@@ -20,8 +20,11 @@ COMPARED = ("blind", "blind:slow", AGENT, "oracle")
 """Columns beside the best way, as far as there are such episodes."""
 
 
+EVALUATED = "evaluated"
+"""Beginning of the columns of an evaluation that is paired with the best way."""
+
 _NOTES = """
-Success without collision. The best way is chosen on the even seeds and judged on the odd ones; the others are judged on
+Success without collision. The best way is chosen on the even seeds, and all are judged on the odd ones; the oracle on
 all. The ways know where the target truly is, so they are an upper bound of what fixed blind ways can do."""
 
 
@@ -83,35 +86,80 @@ def tally(episodes: Iterable[Episode]) -> dict[tuple[str, str], Tally]:
     return tallies
 
 
-def summarise(episodes: Iterable[Episode], ways: Sequence[str]) -> dict[str, list[Row]]:
+def chosen_ways(episodes: Iterable[Episode], ways: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """By scenario the ways to be judged in it: its best one, and the best one for all scenarios at once.
+
+    Args:
+        episodes: on even seeds, of all ways in all scenarios.
+        ways: names of the ways; of equally good ones the first is chosen.
+    """
+    by_scenario = _by_scenario(tally(episodes))
+    everywhere = best_way(by_scenario[ALL] if ALL in by_scenario else next(iter(by_scenario.values())), ways)
+    return {
+        scenario: tuple(dict.fromkeys((best_way(tallies, ways), everywhere)))
+        for scenario, tallies in by_scenario.items()
+        if scenario != ALL
+    }
+
+
+def summarise(
+    episodes: Sequence[Episode], ways: Sequence[str], evaluated: Mapping[tuple[str, int], bool] | None = None
+) -> dict[str, list[Row]]:
     """Rows of every member, and the table of the best ways.
 
     Args:
-        episodes: of all members; of every scenario and member the same seeds.
+        episodes: of all members.
         ways: names of the members to choose from; of equally good ones the first is chosen.
+        evaluated: success without collision of another policy by (scenario, seed), to be paired with the best way.
 
     Returns:
         ``rows`` and ``table``, JSON-able.
     """
     tallies = tally(episodes)
-    scenarios = list(dict.fromkeys(scenario for scenario, _ in tallies))
-    members = list(dict.fromkeys(member for _, member in tallies))
     rows = [_row(scenario, member, value) for (scenario, member), value in tallies.items()]
-    by_scenario = {
-        scenario: {member: tallies[scenario, member] for member in members if (scenario, member) in tallies}
-        for scenario in scenarios
-    }
-    if len(scenarios) > 1:
-        by_scenario[ALL] = {
-            member: sum((tallies[key] for key in tallies if key[1] == member), start=Tally()) for member in members
-        }
-    table = [_table_row(scenario, values, ways) for scenario, values in by_scenario.items()]
+    table = []
+    for scenario, values in _by_scenario(tallies).items():
+        row = _table_row(scenario, values, ways)
+        if evaluated is not None and scenario != ALL:
+            row |= _paired(scenario, row["best"], episodes, evaluated)
+        table.append(row)
     return {"rows": rows, "table": table}
+
+
+def _by_scenario(tallies: Mapping[tuple[str, str], Tally]) -> dict[str, dict[str, Tally]]:
+    """Tallies of the members by scenario; with several scenarios also of all together."""
+    result: dict[str, dict[str, Tally]] = {}
+    for (scenario, member), value in tallies.items():
+        result.setdefault(scenario, {})[member] = value
+    if len(result) > 1:
+        members = dict.fromkeys(member for _, member in tallies)
+        result[ALL] = {member: sum((v for (_, m), v in tallies.items() if m == member), Tally()) for member in members}
+    return result
 
 
 def best_way(tallies: Mapping[str, Tally], ways: Sequence[str]) -> str:
     """The way with the highest rate on the half on which ways are chosen; the first of equals."""
     return max(ways, key=lambda way: tallies[way].chosen_on.rate or 0.0)
+
+
+def _paired(scenario: str, best: str, episodes: Sequence[Episode], evaluated: Mapping[tuple[str, int], bool]) -> Row:
+    """Columns of another policy on the seeds on which the best way was judged, and of the difference in points."""
+    pairs = [
+        (evaluated[scenario, episode["seed"]], bool(episode["success"]))
+        for episode in episodes
+        if episode["scenario"] == scenario and episode["member"] == best and episode["seed"] % 2
+        if (scenario, episode["seed"]) in evaluated
+    ]
+    row = Counts(sum(first for first, _ in pairs), len(pairs)).columns(EVALUATED)
+    if pairs:
+        counts = [pairs.count(pair) for pair in ((True, True), (True, False), (False, True), (False, False))]
+        low, high = paired_difference_interval(*counts)
+        row |= {
+            "difference": (counts[1] - counts[2]) / len(pairs),
+            "difference_low": low,
+            "difference_high": high,
+        }
+    return row
 
 
 def _row(scenario: str, member: str, value: Tally) -> Row:
@@ -121,19 +169,19 @@ def _row(scenario: str, member: str, value: Tally) -> Row:
         "k": value.whole.k,
         "n": value.whole.n,
         "chosen_on_k": value.chosen_on.k,
+        "chosen_on_n": value.chosen_on.n,
         "judged_on_k": value.judged_on.k,
+        "judged_on_n": value.judged_on.n,
         "collisions": value.collisions,
     }
 
 
 def _table_row(scenario: str, tallies: Mapping[str, Tally], ways: Sequence[str]) -> Row:
     best = best_way(tallies, ways)
-    highest = max(ways, key=lambda way: tallies[way].whole.rate or 0.0)
     row: Row = {"scenario": scenario, "best": best}
     row |= tallies[best].judged_on.columns("best", scenario != ALL)
     row |= {"chosen_on_k": tallies[best].chosen_on.k, "chosen_on_n": tallies[best].chosen_on.n}
-    # Chosen and judged on the same seeds, so too high.
-    row |= {"hindsight": highest, "hindsight_k": tallies[highest].whole.k, "hindsight_n": tallies[highest].whole.n}
+    row["mean_rate"] = sum((tallies[way].chosen_on for way in ways), Counts()).rate
     for name in COMPARED:
         for member in tallies:
             if member == name or (name == AGENT and member.startswith(f"{AGENT}:")):
@@ -143,16 +191,25 @@ def _table_row(scenario: str, tallies: Mapping[str, Tally], ways: Sequence[str])
 
 def format_table(table: Sequence[Row]) -> str:
     """The table as plain text."""
-    names = [name for name in COMPARED if any(f"{name}_n" in row for row in table)]
-    header = ("scenario", "best blind way", "chosen on", "judged on [95 % CI]", "best of all", *names)
-    lines: list[tuple[str, ...]] = [header]
+    names = [name for name in (*COMPARED, EVALUATED) if any(f"{name}_n" in row for row in table)]
+    paired = any("difference" in row for row in table)
+    header = ("scenario", "best blind way", "mean of all", "chosen on", "judged on [95 % CI]", *names)
+    lines: list[tuple[str, ...]] = [(*header, "minus best way, points") if paired else header]
     for row in table:
-        cells = [row["scenario"], row["best"], f"{row['chosen_on_k']}/{row['chosen_on_n']}", _rate(row, "best")]
-        cells.append(f"{row['hindsight_k']}/{row['hindsight_n']}")
-        lines.append((*cells, *(_rate(row, name) for name in names)))
-    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
+        cells = [row["scenario"], row["best"], f"{100.0 * row['mean_rate']:.0f}%"]
+        cells += [f"{row['chosen_on_k']}/{row['chosen_on_n']}", _rate(row, "best"), *(_rate(row, n) for n in names)]
+        lines.append((*cells, _difference(row)) if paired else tuple(cells))
+    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
     text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
     return "\n".join([text[0], "-" * max(map(len, text)), *text[1:], _NOTES])
+
+
+def _difference(row: Row) -> str:
+    if "difference" not in row:
+        return "-"
+    return "{:+.0f} [{:+.0f}, {:+.0f}]".format(
+        *(100.0 * row[name] for name in ("difference", "difference_low", "difference_high"))
+    )
 
 
 def _rate(row: Row, name: str) -> str:
