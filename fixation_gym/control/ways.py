@@ -22,6 +22,8 @@ _ASIDE = 0.03
 """What is nearer to the line of sight than this is in view; if it was not seen, looking at it helps no more, m."""
 _TRIED_WITHIN = math.cos(math.radians(14.0))
 """Cosine of the angle within which ways count as the one that was tried."""
+_ROLLS = 11
+"""Turns of the hand that are tried."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,10 @@ class WayCosts:
     """For the lowest ways: the fingers are next to the table and can hardly turn to close on what stands askew."""
     strain: float = 0.15
     """At the border of the arm's reach."""
+    wide: float = 0.8
+    """Where the fingers, however the hand turns, do not get around the target."""
+    finger_span: tuple[float, float] = (0.077, 0.082)
+    """Widths of the target for which they get around it for sure, and not at all, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +143,26 @@ def known_ways(points: FloatArray, weights: FloatArray, target: FloatArray, seen
     return Ways(ways, evidence, seen.unseen_shares)
 
 
-def way_costs(ways: Ways, present: FloatArray, tried: FloatArray, full_weight: float, costs: WayCosts) -> FloatArray:
+def grasp_axes(ways: FloatArray, largest_roll: float) -> FloatArray:
+    """Axes along which the fingers may close for every way, unit vectors of shape (ways, rolls, 3), in base.
+
+    Args:
+        ways: unit vectors from target to camera, shape (ways, 3).
+        largest_roll: of the hand against level, rad.
+    """
+    axes = level_axes(ways)
+    rolls = np.linspace(-largest_roll, largest_roll, _ROLLS)
+    return np.cos(rolls)[:, None] * axes[:, None, 0] + np.sin(rolls)[:, None] * axes[:, None, 1]
+
+
+def way_costs(
+    ways: Ways,
+    present: FloatArray,
+    tried: FloatArray,
+    full_weight: float,
+    costs: WayCosts,
+    widths: FloatArray | None = None,
+) -> FloatArray:
     """What every way costs, shape (n,), in radians of turning.
 
     Args:
@@ -146,12 +171,16 @@ def way_costs(ways: Ways, present: FloatArray, tried: FloatArray, full_weight: f
         tried: ways that were tried in vain, shape (m, 3).
         full_weight: evidence in a corridor at which it is surely blocked.
         costs: the prices.
+        widths: of the target between the fingers for every way, shape (n,), m; None: not known.
     """
     turn = np.arccos(np.clip(ways.directions @ present, -1.0, 1.0))
     again = (ways.directions @ tried.T > _TRIED_WITHIN).sum(axis=1) if len(tried) else 0.0
     blocked = costs.blocked * np.log1p(ways.evidence / full_weight)
     unseen = costs.unseen * np.minimum(ways.unseen / costs.much_unseen, 1.0)
     arm = costs.strain * _AT_BORDER + costs.low * _LOW
+    if widths is not None:
+        sure, never = costs.finger_span
+        arm = arm + costs.wide * np.clip((widths - sure) / (never - sure), 0.0, 1.0)
     return turn + blocked + unseen + costs.tried * again + arm
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from fixation_gym.control.ways import (
     SeenSpace,
     chosen_way,
+    grasp_axes,
     known_ways,
     lateral_direction,
     way_costs,
@@ -80,7 +81,11 @@ class WaySearch:
         if blocked and (near or waited) and self._way is not None and self._arrived < math.inf:
             self._tried = np.vstack([self._tried, ways.directions[self._way]])
             self._arrived = math.inf
-        cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs)
+        widths = None
+        if percept.body is not None:
+            axes = grasp_axes(ways.directions, gains.gaze.max_roll)
+            widths = percept.body.widths(axes.reshape(-1, 3)).reshape(axes.shape[:2]).min(axis=1)
+        cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs, widths)
         way = chosen_way(cost, self._way, gains.costs)
         if way != self._way:
             self._way, self._arrived = way, math.inf

@@ -78,6 +78,10 @@ class UprightBody:
         """Distance from the centre to the plane with this unit normal, shape (3,) in base, that touches the body, m."""
         return float(_support(self.parameters, normal[None])[0])
 
+    def widths(self, axes: FloatArray) -> FloatArray:
+        """How wide the body is along axes, unit vectors of shape (n, 3) in base; shape (n,), m."""
+        return 2.0 * _support(self.parameters, axes)
+
     def depth(self, T_base_cam: FloatArray) -> tuple[float, float]:
         """Depth of the centre along a camera's optical axis and its standard deviation, m."""
         axis = T_base_cam[:3, 2]
