@@ -28,7 +28,7 @@ _SPEED = 0.10
 _CLOSE_SECONDS = 0.8
 _HELD = 0.045
 """A target whose centre is farther than this from the tool's point is not held, m."""
-_LIFT_HEIGHT = 0.135
+_LIFT_HEIGHT = 0.17
 """How far to lift, m."""
 _PALM_ROOM = 0.029
 """Depth to which a thing fits between the fingers behind the tool's point, m."""

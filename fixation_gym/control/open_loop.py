@@ -71,7 +71,7 @@ class OpenLoopGains:
     """Time to close the fingers, s."""
     empty_width: float = 0.012
     """Fingers closer than this hold nothing, m."""
-    lift_height: float = 0.135
+    lift_height: float = 0.17
     """How far to lift, m."""
     hold_seconds: float = math.inf
     """After this time in the lift the hand lets go and backs off, s; inf: it holds on."""

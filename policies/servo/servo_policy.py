@@ -169,7 +169,7 @@ class ServoPolicy:
             phase_seconds=time - self._phase_start,
             unseen_seconds=unseen,
             distance=fixation.distance_m,
-            distance_std=fixation.distance_std_m,
+            distance_std=self._goal_std(percept),
             offset=float(np.linalg.norm(fixation.centroid)),
             blocked=obstacle.evidence > self.gains.obstacle_evidence,
             grasps=self._grasps,
@@ -181,6 +181,11 @@ class ServoPolicy:
             self._grasps += 1
         elif phase is not self._phase:
             self._phase, self._phase_start = phase, time
+
+    def _goal_std(self, percept: Percept) -> float:
+        """How surely the depth of what a grasp goes for is known, m: the body's centre, once there is one."""
+        std = percept.fixation.distance_std_m
+        return std if percept.body is None else min(std, percept.body.depth(self._fixator.T_base_cam)[1])
 
     # -- laws ----------------------------------------------------------------------------------------------------
 

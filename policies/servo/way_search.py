@@ -43,6 +43,7 @@ class WaySearch:
         self._way: int | None = None
         self._arrived = math.inf
         self._tried = np.zeros((0, 3))
+        self._widths: FloatArray | None = None
 
     @property
     def has_way(self) -> bool:
@@ -81,11 +82,10 @@ class WaySearch:
         if blocked and (near or waited) and self._way is not None and self._arrived < math.inf:
             self._tried = np.vstack([self._tried, ways.directions[self._way]])
             self._arrived = math.inf
-        widths = None
-        if percept.body is not None:
+        if percept.body is not None:  # while it is lost for a moment, the last one stands
             axes = grasp_axes(ways.directions, gains.gaze.max_roll)
-            widths = percept.body.widths(axes.reshape(-1, 3)).reshape(axes.shape[:2]).min(axis=1)
-        cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs, widths)
+            self._widths = percept.body.widths(axes.reshape(-1, 3)).reshape(axes.shape[:2]).min(axis=1)
+        cost = way_costs(ways, present, self._tried, gains.obstacle_evidence, gains.costs, self._widths)
         way = chosen_way(cost, self._way, gains.costs)
         if way != self._way:
             self._way, self._arrived = way, math.inf

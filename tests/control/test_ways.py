@@ -6,7 +6,15 @@ import pytest
 
 from fixation_gym.control.corridor import level_axes
 from fixation_gym.control.reach import azimuth_range, directions, sample_direction
-from fixation_gym.control.ways import SeenSpace, WayCosts, chosen_way, known_ways, lateral_direction, way_costs
+from fixation_gym.control.ways import (
+    SeenSpace,
+    WayCosts,
+    chosen_way,
+    grasp_axes,
+    known_ways,
+    lateral_direction,
+    way_costs,
+)
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.robot import TOOL_IN_CAMERA
 
@@ -46,6 +54,23 @@ def test_a_post_in_the_way_turns_the_hand_to_one_side():
     assert ways.evidence[ways.nearest(present)] > 60.0
     best = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS), None, COSTS)
     assert ways.evidence[best] < 30.0
+
+
+def test_a_wide_box_is_approached_along_its_sides_or_from_above():
+    ways = known_ways(NONE, np.zeros(0), TARGET, everything_seen(), 0.01)
+    present = way_at(60, 48)
+    azimuth = math.atan2(present[1], present[0]) - math.radians(45.0)  # askew
+    normals = np.array([[math.cos(azimuth), math.sin(azimuth), 0.0], [-math.sin(azimuth), math.cos(azimuth), 0.0]])
+    axes = grasp_axes(ways.directions, math.radians(50.0))
+    assert np.allclose(np.linalg.norm(axes, axis=2), 1.0)
+    assert np.abs(np.einsum("wrk,wk->wr", axes, ways.directions)).max() < 1e-9
+    half_sizes = np.array([0.035, 0.035, 0.035])
+    widths = (2.0 * np.abs(axes @ np.vstack([normals, [0.0, 0.0, 1.0]]).T) @ half_sizes).min(axis=1)
+    best = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS, widths), None, COSTS)
+    assert widths[ways.nearest(present)] > COSTS.finger_span[1]
+    assert widths[best] < COSTS.finger_span[1]
+    narrow = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS, 0.8 * widths), None, COSTS)
+    assert narrow == chosen_way(way_costs(ways, present, NONE, 60.0, COSTS), None, COSTS)
 
 
 def test_what_is_deeper_in_a_corridor_counts_more():

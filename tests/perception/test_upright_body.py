@@ -107,6 +107,15 @@ def test_cut_outlines_do_not_draw_the_centre_away():
     assert np.abs(misfit(body, outlines[-1], TABLE)).max() < 1.5
 
 
+def test_widths_of_a_box_along_its_sides_and_askew():
+    half_sizes, yaw = (0.025, 0.02, 0.035), 0.4
+    centre = np.array([0.5, -0.1, TABLE + half_sizes[2]])
+    body, _ = fitted(surface("box", half_sizes, yaw, centre), centre, approach(centre))
+    across = np.array([[np.cos(a), np.sin(a), 0.0] for a in (yaw, yaw + np.pi / 2, yaw + np.pi / 4)])
+    truth = [0.050, 0.040, 2.0 * (0.025 + 0.020) / np.sqrt(2.0)]
+    np.testing.assert_allclose(body.widths(across), truth, atol=0.003)
+
+
 def test_depth_of_the_centre_with_its_standard_deviation():
     centre = np.array([0.5, -0.1, 0.13])
     pose = approach(centre)[-1]
