@@ -20,7 +20,7 @@ import tyro
 from fixation_gym.errors import UsageError
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train
-from fixation_gym.report_commands import Ablate, Necessity, Report, print_different, split_names
+from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, print_different, split_names
 
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 """What a disk that is full or broken says."""
@@ -244,6 +244,7 @@ Commands = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Ablate, tyro.conf.subcommand("ablate")]
+    | Annotated[Ladder, tyro.conf.subcommand("ladder")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Compare, tyro.conf.subcommand("compare")]

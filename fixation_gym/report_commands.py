@@ -1,4 +1,4 @@
-"""The commands ``ablate``, ``necessity`` and ``report``; see ``cli``."""
+"""The commands ``ablate``, ``ladder``, ``necessity`` and ``report``; see ``cli``."""
 
 from __future__ import annotations
 
@@ -66,6 +66,46 @@ class Ablate:
         print_different(different)
         print(format_ablations(summary, {variant.name: variant.summary for variant in VARIANTS}))
         print(f"\n{self.out / REPORT_FILE}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """From the paper's algorithm to the servo, one change at a time, on the same episodes; what each change buys."""
+
+    scenario: str = ""
+    """Scenario names, separated by commas; by default all in which the target is red."""
+    episodes: int = 20
+    """Episodes per scenario and policy."""
+    seed: int = 0
+    """Chooses the block of episode seeds, as in evaluate."""
+    workers: int = 1
+    """Number of processes."""
+    gallery: int = 40
+    """Most failures that the report shows."""
+    out: Path = Path("out/ladder")
+    """Folder of table, figure and report; each policy gets a folder in it. The same command again resumes."""
+
+    def run(self) -> int:
+        """Evaluate and print the table."""
+        from fixation_gym.envs.config import SCENARIOS
+        from fixation_gym.evaluation.evaluate import EvaluationConfig
+        from policies.ladder import BESIDE, LADDER
+
+        red = tuple(name for name, item in SCENARIOS.items() if not item.any_colour)
+        config = EvaluationConfig(
+            scenarios=split_names(self.scenario) if self.scenario else red,
+            episodes=self.episodes,
+            seed=self.seed,
+            workers=self.workers,
+        )
+        config.check()
+        select_backend()
+        from fixation_gym.reporting.ladder import FIGURE_FILE, LADDER_FILE, climb, format_ladder
+        from fixation_gym.reporting.report import REPORT_FILE
+
+        print(format_ladder(climb(config, LADDER, BESIDE, self.out, self.gallery)))
+        print("\n" + "\n".join(str(self.out / name) for name in (LADDER_FILE, FIGURE_FILE, REPORT_FILE)))
         return 0
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -81,12 +81,16 @@ class PaperVariant:
     """What tells front from behind."""
     knows_table: bool = False
     """Whether the table's height is known: it is no obstacle then, and the fingers keep off it."""
+    body: bool = False
+    """Whether the grasp goes for the middle of the body that fits the outlines, not of the surface in view."""
     limits: bool = False
     """Whether the camera keeps within the arm's reach, and the hand level or across the target."""
 
     def policy(self, intrinsics: Intrinsics, table_height: float) -> PaperPolicy:
         """The policy for a camera; ``table_height`` in base, m."""
-        settings = PerceptionSettings(centre=None, zero_flow=ZeroFlowSettings(rule=self.rule))
+        settings = PerceptionSettings(zero_flow=ZeroFlowSettings(rule=self.rule))
+        if not self.body:
+            settings = replace(settings, centre=None)
         perception = Perception(
             intrinsics,
             settings,
@@ -191,6 +195,17 @@ PAPER_VARIANTS: tuple[PaperVariant, ...] = (
         rule=exact_rule,
         knows_table=True,
         limits=True,
+    ),
+    PaperVariant(
+        "paper:body",
+        "the grasp goes for the middle of the body fitted to outlines",
+        feed_forward=True,
+        estimator=None,
+        follow=True,
+        rule=exact_rule,
+        knows_table=True,
+        limits=True,
+        body=True,
     ),
 )
 PAPER_NAMES = tuple(variant.name for variant in PAPER_VARIANTS)

@@ -89,7 +89,12 @@ VARIANTS: tuple[ServoVariant, ...] = (
         "the body fitted to outlines: the middle of the surface in view counts as the target's centre",
         perception=PerceptionSettings(centre=None),
     ),
-    ServoVariant("servo:no_retry", "one grasp only", gains=ServoGains(max_grasps=1)),
+    ServoVariant("servo:no_retry", "a second try: one grasp only", gains=ServoGains(max_grasps=1)),
+    ServoVariant(
+        "servo:ways_only",
+        "looking before going, and a second try",
+        gains=ServoGains(costs=WayCosts(unseen=0.0), seen_share=0.0, max_grasps=1),
+    ),
 )
 VARIANT_NAMES = tuple(variant.name for variant in VARIANTS)
 
