@@ -1,4 +1,4 @@
-"""From images and camera poses to the fixated distance and the zero-flow map: NumPy, SciPy, OpenCV."""
+"""From images and camera poses to the fixated distance and the zero-flow map: NumPy, SciPy, OpenCV, numba."""
 
 from fixation_gym.perception.detection.colour import RED, Colour, ColourDetector, segment
 from fixation_gym.perception.detection.detector import Detector, GivenMasks

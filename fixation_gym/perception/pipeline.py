@@ -19,7 +19,6 @@ from fixation_gym.perception.detection.tracking import Track, expected_at, follo
 from fixation_gym.perception.distance.estimator import DistanceEstimator, PoseEstimator, inverse_distance
 from fixation_gym.perception.distance.following import Frame
 from fixation_gym.perception.distance.pose_filter import Fixation
-from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.flow.gradients import FlowSettings
 from fixation_gym.perception.flow.optic_flow import (
     Flow,
@@ -84,8 +83,7 @@ class Perception:
             halvings += 1
         self._working = intrinsics.scaled(shape[0] >> halvings, shape[1] >> halvings)
         self._scratch = Scratch()
-        if kernels.enabled:
-            _run_once()
+        _run_once()
         self.reset()
 
     def reset(self) -> None:

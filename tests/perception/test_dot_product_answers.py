@@ -4,7 +4,6 @@ from functools import partial
 
 import cv2
 import numpy as np
-import pytest
 from test_pipeline_and_zero_flow import (
     CAMERA,
     POSTERS,
@@ -21,7 +20,6 @@ from test_pipeline_and_zero_flow import (
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception import Perception, PerceptionSettings, ZeroFlowSettings
-from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front, rule_answers
 from fixation_gym.perception.zero_flow.front_rule import dot_product_rule
 from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
@@ -43,9 +41,7 @@ def test_the_side_is_the_rules_and_the_depth_lies_on_it():
     np.testing.assert_array_equal(answers.inverse_depth_std, 0.1 * depth)
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_without_a_table_every_pixel_with_evidence_is_what_the_rule_says(monkeypatch, compiled):
-    monkeypatch.setattr(kernels, "enabled", compiled and kernels.enabled)
+def test_without_a_table_every_pixel_with_evidence_is_what_the_rule_says():
     perception, percept, _, _ = run(POSTERS, 8, perception=Perception(CAMERA, RULE))
     first, _, last = perception._frames
     front = dot_product_front(percept.flow, mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time))

@@ -1,12 +1,10 @@
-import hashlib
-import subprocess
-import sys
 from dataclasses import fields
 from functools import cache
-from pathlib import Path
 
 import cv2
+import numba
 import numpy as np
+import plain_twins as twins
 import pytest
 from pinhole_scene import Rectangle, Scene, fixating_pose, noise_texture, observe, upright
 from scipy.special import ndtr
@@ -15,13 +13,11 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception import Colour, Perception
 from fixation_gym.perception.detection import colour as segmentation
 from fixation_gym.perception.flow import gradients, kernels
-from fixation_gym.perception.zero_flow import zero_flow
+from fixation_gym.perception.zero_flow import pixel_kernels, zero_flow
 from fixation_gym.perception.zero_flow.evidence_map import evidence_map
-from fixation_gym.perception.zero_flow.pixel_answers import normal_distribution
 from fixation_gym.perception.zero_flow.zero_flow import ZeroFlowSettings
 
 FOVY = np.deg2rad(42.5)
-needs_numba = pytest.mark.skipif(not kernels.enabled, reason="numba is not installed")
 
 
 @cache
@@ -48,23 +44,22 @@ def percepts(height, width, **options):
     return [perception.update(observation) for observation in observations(height, width)]
 
 
-def without_kernels(monkeypatch):
-    monkeypatch.setattr(kernels, "enabled", False)
-
-
-@needs_numba
-@pytest.mark.parametrize(("height", "width"), [(128, 128), (240, 320), (97, 131), (60, 82)])
+# Odd in both, in one, on the grid, farther up the pyramid; two grids have fewer pixels than cells.
+@pytest.mark.parametrize(
+    ("height", "width"),
+    [(128, 128), (240, 320), (97, 131), (60, 82), (96, 131), (97, 128), (163, 242), (166, 246), (33, 47)],
+)
 @pytest.mark.parametrize("support", [None, 0.0])
 def test_compiled_and_plain_code_say_the_same(height, width, support, monkeypatch):
     compiled = percepts(height, width, support_height_m=support)[-1]
-    without_kernels(monkeypatch)
+    twins.put_in_place(monkeypatch)
     plain = percepts(height, width, support_height_m=support)[-1]
     np.testing.assert_array_equal(compiled.segmentation.mask, plain.segmentation.mask)
     np.testing.assert_allclose(compiled.flow.residual, plain.flow.residual, atol=2e-5)
     np.testing.assert_allclose(compiled.flow.residual_cov, plain.flow.residual_cov, rtol=1e-4, atol=1e-6)
     assert (compiled.zfc.supported != plain.zfc.supported).mean() < 1e-4
     both = compiled.zfc.supported & plain.zfc.supported
-    assert both.mean() > 0.3
+    assert both.mean() > 0.1  # borders take much of a small image
     for name in ("p_nearer", "inverse_depth", "inverse_depth_std"):
         np.testing.assert_allclose(getattr(compiled.zfc, name)[both], getattr(plain.zfc, name)[both], atol=2e-4)
     cells = np.abs(compiled.zfc.cells.astype(int) - plain.zfc.cells)
@@ -72,44 +67,56 @@ def test_compiled_and_plain_code_say_the_same(height, width, support, monkeypatc
     assert (cells > 1).mean() < 0.002
 
 
-@needs_numba
+@pytest.mark.parametrize("size", [(96, 128), (97, 131), (96, 131), (97, 128), (3, 3), (2, 9)])
+def test_pixels_are_pooled_by_area_for_every_size(size):
+    smooth, change = np.random.default_rng(2).normal(0, 30, (2, *size)).astype(np.float32)
+    compiled, plain = np.empty((2, 9, size[0] // 2, size[1] // 2), np.float32)
+    for way, pooled in ((kernels, compiled), (twins, plain)):
+        noise = np.float32(0.0125), np.float32(3.0), np.float32(0.7)
+        way.pooled_products(smooth, change, gradients.SPACE_PREFILTER, gradients.SPACE_DERIVATIVE, noise, pooled)
+    np.testing.assert_allclose(compiled, plain, rtol=1e-3, atol=1e-5 * np.abs(plain).max())
+
+
+@pytest.mark.parametrize("size", [(40, 64), (41, 65), (40, 65), (41, 64), (121, 163)])
+def test_a_coarse_level_is_enlarged_for_every_size(size):
+    rng = np.random.default_rng(3)
+    coarse = rng.normal(0, 30, (5, size[0] // 2, size[1] // 2)).astype(np.float32)
+    motion, fine = rng.normal(0, 1, coarse[:2].shape).astype(np.float32), np.zeros((5, *size), np.float32)
+    compiled, plain = fine.copy(), fine.copy()
+    for way, sums in ((kernels, compiled), (twins, plain)):
+        way.take_coarse_where_fast(coarse, motion, np.float32(1.4), gradients._TO_FINER_PX, sums)
+    assert 0.3 < (plain[0] != 0).mean() < 0.7
+    np.testing.assert_array_equal(compiled != 0, plain != 0)
+    np.testing.assert_allclose(compiled, plain, atol=1e-3)
+
+
 @pytest.mark.parametrize("colour", [segmentation.RED, Colour(120, 20, 0.3, 0.2), Colour(345, 30, 0.5, 0.0)])
-def test_the_compiled_colour_test_is_that_of_opencv_to_the_bit(colour, monkeypatch):
+def test_the_compiled_colour_test_is_that_of_opencv_to_the_bit(colour):
     green, blue = np.meshgrid(np.arange(256), np.arange(256))
     for red in (0, 1, 39, 40, 41, 127, 200, 255):
         image = np.stack([np.full_like(green, red), green, blue], axis=-1).astype(np.uint8)
-        window = slice(0, 256), slice(0, 256)
-        with monkeypatch.context() as context:
-            compiled = segmentation._in_colour_range(image, window, colour)
-            context.setattr(kernels, "enabled", False)
-            np.testing.assert_array_equal(compiled, segmentation._in_colour_range(image, window, colour))
+        for window, step in (((slice(0, 256), slice(0, 256)), 1), ((slice(2, 242), slice(4, 253)), 3)):
+            compiled = segmentation._in_colour_range(image, window, colour, step)
+            np.testing.assert_array_equal(compiled, twins.in_colour_range(image, window, colour, step))
 
 
-@needs_numba
-@pytest.mark.parametrize("shape", [(64, 64), (120, 160), (97, 131), (32, 33)])
-def test_cells_are_area_means_for_every_grid(shape, monkeypatch):
+@pytest.mark.parametrize(
+    "shape", [(64, 64), (120, 160), (97, 131), (32, 33), (20, 24), (31, 40), (15, 45), (100, 7), (1, 1)]
+)
+def test_cells_are_area_means_for_every_grid(shape):
     rng = np.random.default_rng(0)
     supported = cv2.resize(rng.random((9, 9)), shape[::-1]) > 0.4
     p_nearer = np.where(supported, rng.random(shape), 0.5).astype(np.float32)
     moving = rng.random(shape) > 0.99
     compiled = evidence_map(p_nearer, supported, moving, ZeroFlowSettings())
-    without_kernels(monkeypatch)
-    plain = evidence_map(p_nearer, supported, moving, ZeroFlowSettings())
+    plain = twins.evidence_map(p_nearer, supported, moving, ZeroFlowSettings())
     assert (compiled != plain).mean() < 0.005  # ties in rounding
 
 
 def test_the_normal_distribution_is_that_of_scipy():
     z = np.concatenate([np.linspace(-40, 40, 4001), [0.0, -0.0, 1e9, -1e9]]).astype(np.float32)
-    np.testing.assert_allclose(normal_distribution(z), ndtr(z.astype(np.float64)), atol=2e-6)
-
-
-def test_an_image_cut_into_strips_has_the_same_gradients(monkeypatch):
-    without_kernels(monkeypatch)
-    smooth, change = np.random.default_rng(1).normal(0, 30, (2, 96, 128)).astype(np.float32)
-    arguments = (smooth, change, 2.0, gradients.FlowSettings(), 2)
-    whole = gradients.gradient_sums(*arguments, gradients.Scratch())
-    monkeypatch.setattr(gradients, "_STRIP_PIXELS", 128 * 22)
-    np.testing.assert_array_equal(gradients.gradient_sums(*arguments, gradients.Scratch()), whole)
+    compiled = [pixel_kernels._normal_distribution(value) for value in z]
+    np.testing.assert_allclose(compiled, ndtr(z.astype(np.float64)), atol=2e-6)
 
 
 def test_what_was_handed_out_is_never_overwritten():
@@ -151,25 +158,13 @@ def test_a_mask_on_the_grid_covers_every_pixel_of_it(shape):
     np.testing.assert_array_equal(zero_flow.widened_on_grid(mask, shape, 0), area > 0)
 
 
-SCRIPT = """
-import sys
-sys.modules["numba"] = None
-sys.path[:0] = sys.argv[1:3]
-from test_kernels import digest, kernels
-print(digest(), kernels.enabled)
-"""
+def test_loops_are_compiled_where_nothing_can_be_cached(monkeypatch):
+    njit = numba.njit
 
+    def without_a_place(cache=False, **options):
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return njit(**options)
 
-def digest():
-    last = percepts(96, 128)[-1]
-    data = b"".join(array.tobytes() for array in (last.zfc.p_nearer, last.zfc.cells, last.flow.flow, last.flow.cov))
-    return hashlib.sha256(data).hexdigest()
-
-
-def test_a_process_without_numba_gets_the_bits_of_the_plain_code(monkeypatch):
-    without_kernels(monkeypatch)
-    here = Path(__file__).parent
-    command = [sys.executable, "-c", SCRIPT, str(here), str(here.parent.parent)]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stderr
-    assert result.stdout.split() == [digest(), "False"]
+    monkeypatch.setattr(numba, "njit", without_a_place)
+    assert kernels.compiled(lambda x: x + 1)(1) == 2

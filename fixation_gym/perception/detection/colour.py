@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.detection.segmentation import Segmentation, segmentation_of
 from fixation_gym.perception.detection.tracking import FIRST_LOOK, Expectation
-from fixation_gym.perception.flow import kernels
 from fixation_gym.perception.zero_flow import pixel_kernels
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 
@@ -133,19 +132,9 @@ def _in_colour_range(rgb: ImageArray, window: tuple[slice, slice], colour: Colou
     """Every ``step``-th pixel of a part of the image: 1 within the colour range, else 0."""
     rows, columns = window
     shape = ((rows.stop - rows.start) // step, (columns.stop - columns.start) // step)
-    if kernels.enabled:
-        result = np.empty(shape, np.uint8)
-        pixel_kernels.in_colour_range(rgb, (rows.start, columns.start), step, *_colour_tables(colour), result)
-        return result
-    part = rgb[window]
-    if step > 1:
-        part = cv2.resize(part, shape[::-1], interpolation=cv2.INTER_NEAREST)
-    hsv = np.asarray(cv2.cvtColor(part, cv2.COLOR_RGB2HSV), np.uint8)  # OpenCV keeps hue in units of 2 degrees
-    masks = [
-        np.asarray(cv2.inRange(hsv, (low, *_least_values(colour), 0), (high, 255, 255, 0)), np.uint8)
-        for low, high in _hue_ranges(colour)
-    ]
-    return (masks[0] if len(masks) == 1 else masks[0] | masks[1]) & np.uint8(1)
+    result = np.empty(shape, np.uint8)
+    pixel_kernels.in_colour_range(rgb, (rows.start, columns.start), step, *_colour_tables(colour), result)
+    return result
 
 
 def _hue_ranges(colour: Colour) -> list[tuple[int, int]]:

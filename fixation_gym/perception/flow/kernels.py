@@ -1,32 +1,22 @@
-"""Compiled loops for the flow, and the switch for all compiled loops; optional.
-
-Every kernel here and in ``pixel_kernels`` does in one pass what the plain code of the same stage does in dozens; the
-results agree within float32 rounding. Without numba, or with ``enabled`` set to False, the plain code runs. The machine
-code is made at the first call and cached on disk beside the source, or else in numba's cache directory.
-"""
+"""Compiled loops for the flow, and how those of all of perception are compiled."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+import numba
 import numpy as np
 
-try:
-    import numba
-except ImportError:
-    numba = None
-
 WINDOW = 5
-"""Side of the windows of ``window_sums``; others are for the plain code."""
-enabled: bool = numba is not None
-"""Whether the kernels are used; may be set to False at any time."""
+"""Side of the square over which ``window_sums`` pools gradients, px of the flow grid."""
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile at the first call. Sums may be reordered and multiply-adds fused; NaN and inf keep their meaning."""
-    if numba is None:
-        return function
+    """Compile at the first call; the code is cached beside the source, or else in numba's cache directory.
+
+    Sums may be reordered and multiply-adds fused; NaN and inf keep their meaning.
+    """
     options = {"nogil": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
     try:
         return numba.njit(cache=True, **options)(function)
@@ -55,13 +45,27 @@ def _repeat_border(line):
 
 
 @compiled
-def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
-    """Weighted products xx, xy, yy, xt, yt of gradients, gradients x, y, t and weights, pooled over 2 x 2 pixels.
+def _cell_weights(pixels):
+    """Weights of pixels 2 i, 2 i + 1 and 2 i + 2 in cell i of a grid of half the size, shape (3, pixels // 2); sum 2.
 
-    See ``gradients``.
+    Cells are as wide as 2 pixels, or a little wider where the pixels are odd in number.
+    """
+    cells = pixels // 2
+    spill = pixels % 2 * np.arange(cells + 1) / cells  # the part of pixel 2 i that lies in cell i - 1
+    weights = np.ones((3, cells), np.float32)
+    weights[0], weights[2] = 1 - spill[:-1], spill[1:]
+    return weights * np.float32(2 * cells / pixels)
+
+
+@compiled
+def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
+    """Means over 2 x 2 pixels: weighted products xx, xy, yy, xt, yt, weighted gradients x, y, t and the weight.
+
+    Four pixels make one of the grid, whose gradient per px is twice that of the frame: a factor 16 for J, put into the
+    weight. For b it is 8, so the temporal derivative comes halved.
 
     Args:
-        smooth: frames averaged over time, shape (H, W), H and W even.
+        smooth: frames averaged over time, shape (H, W).
         change: their derivative by time, shape (H, W).
         prefilter: 5 symmetric taps.
         derivative: 5 antisymmetric taps.
@@ -76,39 +80,49 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
     products = np.zeros((9, width), np.float32)
     xx, xy, yy, xt, yt = products[0], products[1], products[2], products[3], products[4]
     sx, sy, st, sw = products[5], products[6], products[7], products[8]
-    for row in range(height):
-        a, b, c, d, e = _rows_around(smooth, row)
-        for i in range(width):
-            s[i + 2] = p2 * c[i] + p1 * (b[i] + d[i]) + p0 * (a[i] + e[i])
-            y[i + 2] = d0 * (d[i] - b[i]) + d1 * (e[i] - a[i])
-        a, b, c, d, e = _rows_around(change, row)
-        for i in range(width):
-            t[i + 2] = p2 * c[i] + p1 * (b[i] + d[i]) + p0 * (a[i] + e[i])
-        _repeat_border(s)
-        _repeat_border(y)
-        _repeat_border(t)
-        keep = np.float32(row % 2)  # the second row of a pair adds to the first
-        for i in range(width):
-            gx = d0 * (s[i + 3] - s[i + 1]) + d1 * (s[i + 4] - s[i])
-            gy = p2 * y[i + 2] + p1 * (y[i + 1] + y[i + 3]) + p0 * (y[i] + y[i + 4])
-            gt = p2 * t[i + 2] + p1 * (t[i + 1] + t[i + 3]) + p0 * (t[i] + t[i + 4])
-            gxx, gyy = gx * gx, gy * gy
-            weight = np.float32(0.25) / (model * (gxx + gyy) + temporal)
-            wx, wy, wt = weight * gx, weight * gy, np.float32(0.5) * weight * gt
-            xx[i] = keep * xx[i] + weight * (gxx - own)
-            xy[i] = keep * xy[i] + wx * gy
-            yy[i] = keep * yy[i] + weight * (gyy - own)
-            xt[i] = keep * xt[i] + gx * wt
-            yt[i] = keep * yt[i] + gy * wt
-            sx[i] = keep * sx[i] + wx
-            sy[i] = keep * sy[i] + wy
-            st[i] = keep * st[i] + wt
-            sw[i] = keep * sw[i] + weight
-        if row % 2:
-            for k in range(9):
-                out, line = pooled[k, row // 2], products[k]
-                for i in range(width // 2):
-                    out[i] = line[2 * i] + line[2 * i + 1]
+    row_weights, column_weights = _cell_weights(height), _cell_weights(width)
+    odd = height % 2 or width % 2
+    for cell in range(height // 2):
+        for part in range(2 + height % 2):
+            row = 2 * cell + part
+            a, b, c, d, e = _rows_around(smooth, row)
+            for i in range(width):
+                s[i + 2] = p2 * c[i] + p1 * (b[i] + d[i]) + p0 * (a[i] + e[i])
+                y[i + 2] = d0 * (d[i] - b[i]) + d1 * (e[i] - a[i])
+            a, b, c, d, e = _rows_around(change, row)
+            for i in range(width):
+                t[i + 2] = p2 * c[i] + p1 * (b[i] + d[i]) + p0 * (a[i] + e[i])
+            _repeat_border(s)
+            _repeat_border(y)
+            _repeat_border(t)
+            # The rows of a cell add up, each by its weight relative to that of the last row.
+            keep = row_weights[part - 1, cell] / row_weights[part, cell] if part > 0 else np.float32(0)
+            for i in range(width):
+                gx = d0 * (s[i + 3] - s[i + 1]) + d1 * (s[i + 4] - s[i])
+                gy = p2 * y[i + 2] + p1 * (y[i + 1] + y[i + 3]) + p0 * (y[i] + y[i + 4])
+                gt = p2 * t[i + 2] + p1 * (t[i + 1] + t[i + 3]) + p0 * (t[i] + t[i + 4])
+                gxx, gyy = gx * gx, gy * gy
+                weight = np.float32(0.25) / (model * (gxx + gyy) + temporal)
+                wx, wy, wt = weight * gx, weight * gy, np.float32(0.5) * weight * gt
+                xx[i] = keep * xx[i] + weight * (gxx - own)
+                xy[i] = keep * xy[i] + wx * gy
+                yy[i] = keep * yy[i] + weight * (gyy - own)
+                xt[i] = keep * xt[i] + gx * wt
+                yt[i] = keep * yt[i] + gy * wt
+                sx[i] = keep * sx[i] + wx
+                sy[i] = keep * sy[i] + wy
+                st[i] = keep * st[i] + wt
+                sw[i] = keep * sw[i] + weight
+        last = row_weights[1 + height % 2, cell]
+        for k in range(9):
+            out, line = pooled[k, cell], products[k]
+            for i in range(width // 2):
+                first, second, third = line[2 * i], line[2 * i + 1], line[min(2 * i + 2, width - 1)]
+                if odd:
+                    w = column_weights[:, i]
+                    out[i] = last * (w[0] * first + w[1] * second + w[2] * third)
+                else:
+                    out[i] = first + second
 
 
 @compiled
@@ -131,8 +145,13 @@ def window_sums(planes, sums):
 def centred_sums(windows, least, sums):
     """Products about the means of each window, with at least ``least`` information in every direction.
 
-    See ``gradients``. ``windows``, shape (9, h, w), holds sums as of ``pooled_products``; the result has shape
-    (5, h, w).
+    Along a weak edge the noise taken out may exceed what was there; motion along it would seem huge and well known. So
+    the smaller eigenvalue of J is raised to ``least``.
+
+    Args:
+        windows: sums over windows of what ``pooled_products`` gives, shape (9, h, w).
+        least: information, (px/interval)^-2.
+        sums: result, J_xx, J_xy, J_yy, b_x, b_y, shape (5, h, w).
     """
     height, width = sums.shape[1:]
     for row in range(height):
@@ -152,7 +171,7 @@ def centred_sums(windows, least, sums):
 
 @compiled
 def solve_windows(sums, weak, cov, residual):
-    """Invert J = sums[:3] with a weak prior into cov and solve residual = -cov b, b = sums[3:]; see ``gradients``."""
+    """Invert J = sums[:3] with a weak prior into cov and solve residual = -cov b, b = sums[3:]; see ``solve``."""
     height, width = sums.shape[1:]
     for row in range(height):
         xx, xy, yy, x, y = sums[0, row], sums[1, row], sums[2, row], sums[3, row], sums[4, row]
@@ -168,6 +187,30 @@ def solve_windows(sums, weak, cov, residual):
 
 
 @compiled
+def _bilinear(coarse, fine):
+    """Where a fine line lies on a coarse one: nearest pixel and the one beside it, and their shares; each (2, fine).
+
+    Args:
+        coarse: number of pixels of the coarse line.
+        fine: number of pixels of the fine line.
+    """
+    pixels, shares = np.empty((2, fine), np.uint32), np.empty((2, fine), np.float32)  # unsigned is quicker to index by
+    for i in range(fine):
+        place = (i + 0.5) * coarse / fine - 0.5
+        nearest = int(np.floor(place + 0.5))
+        beside = nearest + 1 if place > nearest else nearest - 1
+        pixels[0, i], pixels[1, i] = nearest, min(max(beside, 0), coarse - 1)
+        shares[0, i], shares[1, i] = 1 - abs(place - nearest), abs(place - nearest)
+    return pixels, shares
+
+
+@compiled
+def _fine_pixels(pixel, odd):
+    """Pixels of a fine line that are decided by one of the coarse line: two, but three by the first if it is odd."""
+    return range(2 * pixel + odd * min(pixel, 1), 2 * pixel + 2 + odd)
+
+
+@compiled
 def take_coarse_where_fast(coarse, motion, fastest, scales, sums):
     """Replace the sums of a level by those of the next coarser one, enlarged bilinearly, where that sees fast motion.
 
@@ -176,22 +219,23 @@ def take_coarse_where_fast(coarse, motion, fastest, scales, sums):
         motion: its motion, shape (2, h, w).
         fastest: square of the fastest motion that the finer level is trusted with, in px of the coarser.
         scales: of the five sums, from px of the coarser level to px of the finer one.
-        sums: of the finer level, shape (5, 2 h, 2 w); changed in place.
+        sums: of the finer level, shape (5, H, W) with h = H // 2 and w = W // 2; changed in place.
     """
-    count, height, width = coarse.shape
-    near, far = np.float32(0.75), np.float32(0.25)
+    height, width = motion.shape[1:]
+    odd_row, odd_column = sums.shape[1] % 2, sums.shape[2] % 2
+    rows, row_shares = _bilinear(height, sums.shape[1])
+    columns, column_shares = _bilinear(width, sums.shape[2])
     for row in range(height):
         u, v = motion[0, row], motion[1, row]
-        for column in range(width):
-            if u[column] * u[column] + v[column] * v[column] <= fastest:
-                continue
-            for k in range(count):
-                plane, scale = coarse[k], scales[k]
-                for down in range(2):
-                    here, there = plane[row], plane[min(max(row + 2 * down - 1, 0), height - 1)]
-                    out = sums[k, 2 * row + down]
-                    centre = near * here[column] + far * there[column]
-                    for across in range(2):
-                        other = min(max(column + 2 * across - 1, 0), width - 1)
-                        side = near * here[other] + far * there[other]
-                        out[2 * column + across] = scale * (near * centre + far * side)
+        for i in _fine_pixels(row, odd_row):
+            here, there, out = coarse[:, rows[0, i]], coarse[:, rows[1, i]], sums[:, i]
+            up, down = row_shares[0, i], row_shares[1, i]
+            for column in range(width):
+                if u[column] * u[column] + v[column] * v[column] <= fastest:
+                    continue
+                for j in _fine_pixels(column, odd_column):
+                    x, other, near, far = columns[0, j], columns[1, j], column_shares[0, j], column_shares[1, j]
+                    a, b, c, d = up * near, down * near, up * far, down * far
+                    for k in range(5):
+                        value = a * here[k, x] + b * there[k, x] + c * here[k, other] + d * there[k, other]
+                        out[k, j] = scales[k] * value

@@ -25,6 +25,7 @@ from fixation_gym.perception.flow.gradients import (
     gradient_sums,
     solve,
 )
+from fixation_gym.perception.flow.kernels import WINDOW
 from fixation_gym.perception.scratch import Float32Array, Scratch, fill
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
@@ -138,7 +139,7 @@ def estimate_flow(
         homographies: maps from pixels of the middle frame to the first and to the last one, shape (3, 3); see
             ``plane_homography``. None: no warp.
         warp_inverse_depth: d of the plane in ``homographies``, only recorded.
-        settings: windows and noise; None for the defaults.
+        settings: resolutions and noise; None for the defaults.
         scratch: work arrays to reuse from frame to frame, which is about twice as fast; None for new ones.
     """
     settings, scratch = settings or _DEFAULTS, scratch or Scratch()
@@ -157,7 +158,7 @@ def estimate_flow(
         information=sums[:3],
         gradient=sums[3:],
         warp_inverse_depth=warp_inverse_depth,
-        overlap=_overlap(warp, intrinsics, settings),
+        overlap=_overlap(warp, intrinsics),
         warp=warp,
         frame_intrinsics=intrinsics,
     )
@@ -215,14 +216,14 @@ def _warp_motion(maps: tuple[FloatArray, FloatArray], intrinsics: Intrinsics) ->
     return motion
 
 
-def _overlap(maps: tuple[FloatArray, FloatArray], intrinsics: Intrinsics, settings: FlowSettings) -> MaskArray:
+def _overlap(maps: tuple[FloatArray, FloatArray], intrinsics: Intrinsics) -> MaskArray:
     """Pixels of the grid whose windows lie inside all frames, shape (h, w).
 
     A map takes the inside of a frame to a convex quadrangle. Its sides are lines a column + b row + c = 0; those that
     no corner of the grid lies beyond need no look at the pixels, and most do not.
     """
     columns, rows = _grid_in_frame(intrinsics)
-    margin = settings.window + SPACE_PREFILTER.size // 2 - 1
+    margin = WINDOW + SPACE_PREFILTER.size // 2 - 1
     inner = margin // 2
     overlap = np.zeros((rows.size, columns.size), np.bool_)
     part = overlap[inner:-inner, inner:-inner]

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from fixation_gym.perception.flow import kernels
-from fixation_gym.perception.scratch import Float32Array, fill
+from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.perception.zero_flow import pixel_kernels
 from fixation_gym.perception.zero_flow.front_rule import FrontRule, exact_rule
 from fixation_gym.types import ImageArray, MaskArray
@@ -67,34 +65,11 @@ def evidence_map(
     """
     least_front, weight = np.float32(settings.cell_min_front), np.float32(settings.front_weight)
     least_share = np.float32(settings.cell_min_share)
-    if kernels.enabled and min(p_nearer.shape) >= CELLS:
-        pooled, values = np.empty((5, CELLS, CELLS), np.float32), np.empty((CELLS, CELLS), np.uint8)
-        pixel_kernels.pooled_evidence(p_nearer, supported, moving, pooled)
-        pixel_kernels.map_values(pooled, least_front, weight, least_share, np.uint8(UNKNOWN), values)
-        return values
-    front, front_squared, behind, behind_squared, seen = _pooled(p_nearer, supported, moving)
-    around = cv2.boxFilter(front, cv2.CV_32F, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    bias = (around >= least_front) * weight
-    evidence = bias * front + behind
-    mean_decided = (bias * front_squared - behind_squared) / np.maximum(evidence, np.float32(1e-6))
-    value = np.rint(np.float32(127.5) + np.float32(127.5) * mean_decided)
-    known = (seen >= least_share) & (evidence > np.float32(0.5) * least_share)
-    return np.where(known, value, np.float32(UNKNOWN)).astype(np.uint8)
-
-
-def _pooled(p_nearer: Float32Array, supported: MaskArray, moving: MaskArray) -> list[Float32Array]:
-    """Means over the cells: evidence in front, its square, behind, its square, pixels seen, each of shape (32, 32)."""
-    decided = np.float32(2.0) * p_nearer - np.float32(1.0)  # 0 without evidence
-    front, behind = np.maximum(decided, np.float32(0.0)), np.maximum(-decided, np.float32(0.0))
-    if moving.any():
-        fill(front, 1.0, moving)
-        fill(behind, 0.0, moving)
-    seen = (supported | moving).astype(np.float32)
-    return [_on_cells(plane) for plane in (front, front * front, behind, behind * behind, seen)]
-
-
-def _on_cells(plane: Float32Array) -> Float32Array:
-    """Means over the cells; by columns first, as OpenCV is quick with whole ratios only."""
-    if plane.shape[0] % CELLS and plane.shape[1] % CELLS == 0:
-        plane = np.asarray(cv2.resize(plane, (CELLS, plane.shape[0]), interpolation=cv2.INTER_AREA), np.float32)
-    return np.asarray(cv2.resize(plane, (CELLS, CELLS), interpolation=cv2.INTER_AREA), np.float32)
+    if min(p_nearer.shape) < CELLS:
+        # Each cell needs a pixel. Its mean stays what it is if every pixel is cut in equal parts.
+        pixels = np.ix_(*(np.repeat(np.arange(side), -(-CELLS // side)) for side in p_nearer.shape))
+        p_nearer, supported, moving = p_nearer[pixels], supported[pixels], moving[pixels]
+    pooled, values = np.empty((5, CELLS, CELLS), np.float32), np.empty((CELLS, CELLS), np.uint8)
+    pixel_kernels.pooled_evidence(p_nearer, supported, moving, pooled)
+    pixel_kernels.map_values(pooled, least_front, weight, least_share, np.uint8(UNKNOWN), values)
+    return values
