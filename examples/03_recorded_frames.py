@@ -9,7 +9,7 @@ import numpy as np
 import fixation_gym  # noqa: F401
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
 from policies.catalogue import make_policy
 
@@ -33,7 +33,7 @@ def replay(path: Path) -> float:
     """Run perception on the recording; returns the last distance in m."""
     recording = np.load(path)
     height, width = recording["rgb"].shape[1:3]
-    perception = Perception(Intrinsics.from_fovy(height, width, CAMERA_FOVY))
+    perception = Perception(Intrinsics.from_fovy(height, width, ROBOT.camera.fovy))
     distance = float("nan")
     for k in range(len(recording["time"])):
         percept = perception.update(Observation.from_dict({key: recording[key][k] for key in recording.files}))

@@ -18,7 +18,7 @@ from fixation_gym.geometry.rigid import pose_to_matrix
 from fixation_gym.perception.body.grasp_axis import narrow_axis
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.robot import TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Command, FloatArray, Observation
 
 _LEAST_ROLL = 1e-3
@@ -165,4 +165,4 @@ class Fixator:
 
 def action_of(command: Command) -> np.ndarray:
     """Action of ``FixationPick-v0``, shape (7,), float32, for a command."""
-    return np.array([*command.camera_twist / TWIST_LIMITS, command.gripper], np.float32)
+    return np.array([*command.camera_twist / ROBOT.arm.twist_limits, command.gripper], np.float32)

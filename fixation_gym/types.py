@@ -13,6 +13,8 @@ FloatArray = NDArray[np.floating[Any]]
 """Real numbers; float64 unless said otherwise."""
 ImageArray = NDArray[np.uint8]
 MaskArray = NDArray[np.bool_]
+Vector = tuple[float, float, float]
+"""x, y and z."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,9 +30,9 @@ class Observation:
     rgb: ImageArray
     """Wrist image, shape (H, W, 3), top-left origin."""
     joint_pos: FloatArray
-    """Arm joint angles, shape (7,), rad."""
+    """Arm joint angles, shape (n,), rad."""
     joint_vel: FloatArray
-    """Arm joint velocities, shape (7,), rad/s."""
+    """Arm joint velocities, shape (n,), rad/s."""
     camera_pose: FloatArray
     """Pose of ``cam`` in ``base``, shape (7,): position in m, then unit quaternion (w, x, y, z)."""
     camera_twist: FloatArray

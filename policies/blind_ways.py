@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from fixation_gym.control.reach import HIGHEST, azimuth_range
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 from policies.base import SimulatedWorld
 from policies.grips import grips_of, rolls
@@ -64,7 +64,7 @@ class BlindWay:
             first_view: azimuth from which the camera first looked, in base, rad.
         """
         angle = math.radians(self.azimuth_deg)
-        low, high = azimuth_range(math.radians(self.elevation_deg))
+        low, high = ROBOT.arm.reach.azimuths(math.radians(self.elevation_deg))
         if self.origin == "view":
             return bearing + np.array([min(max(_wrapped(first_view + angle - bearing), low), high)])
         around = np.arange(low, high, _TURN_STEP) if self.origin == "target" else np.zeros(0)
@@ -78,7 +78,7 @@ class BlindWay:
         elif self.style == "stepped" and _stops(seconds):
             rise = _RISE
         lowest = math.radians(self.elevation_deg)
-        return max(lowest, min(lowest + rise, HIGHEST))
+        return max(lowest, min(lowest + rise, ROBOT.arm.reach.highest))
 
     def speed_at(self, seconds: float) -> float:
         """Speed of the approach, m/s, ``seconds`` into it."""

@@ -16,6 +16,7 @@ from fixation_gym.perception.detection.colour import ColourDetector
 from fixation_gym.perception.detection.detector import Detector
 from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.pipeline import Perception
+from fixation_gym.robots import ROBOT
 from policies.base import Policy
 from policies.baselines import RandomPolicy
 from policies.paper import PAPER_NAMES, paper_variant
@@ -139,15 +140,13 @@ def make_policy(name: str, env: Any, detector: str | None = None) -> Policy:
         return OraclePolicy(env.unwrapped)
     if name not in POLICY_NAMES:
         return load_class(name, "--policy", _POLICY_METHODS)(env.unwrapped)
-    from fixation_gym.envs.scene import TABLE_HEIGHT
-
     if name in PAPER_NAMES:
-        return paper_variant(name).policy(env.unwrapped.intrinsics, TABLE_HEIGHT)
+        return paper_variant(name).policy(env.unwrapped.intrinsics, ROBOT.workspace.table_height)
     variant, intrinsics = servo_variant(name), env.unwrapped.intrinsics
     perception = Perception(
         intrinsics,
         variant.perception,
-        support_height_m=TABLE_HEIGHT,
+        support_height_m=ROBOT.workspace.table_height,
         detector=_detector(detector, variant, env.unwrapped)(intrinsics),
         estimator=None if variant.estimator is None else variant.estimator(),
     )

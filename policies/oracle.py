@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from fixation_gym.control import open_loop, servo_laws
+from fixation_gym.control import gaze, open_loop, servo_laws
 from fixation_gym.control.corridor import approach_directions, free_directions
 from fixation_gym.control.reach import reachable_directions
 from fixation_gym.envs.object_pool import target_shape
-from fixation_gym.envs.scene import TABLE_HEIGHT, SceneSpec
+from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.geometry.boxes import BoxSet, box_set, joined
-from fixation_gym.robot import TOOL_IN_CAMERA, TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 from policies.base import Action, Estimate, SimulatedWorld
 from policies.grips import LARGEST_SLANT, grips_of, half_turn, rolls, slants
@@ -30,14 +30,9 @@ _HELD = 0.045
 """A target whose centre is farther than this from the tool's point is not held, m."""
 _LIFT_HEIGHT = 0.17
 """How far to lift, m."""
-_PALM_ROOM = 0.029
-"""Depth to which a thing fits between the fingers behind the tool's point, m."""
-_FOLDED = 0.36
-"""A camera nearer than this to the base's axis strains the folded arm, m."""
 _STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
 """Elevation below which an approach is avoided where possible, for round targets and for those the hand turns to."""
-_FINGERS = np.array([0.050, 0.011, 0.010])
-"""How far the open fingers reach beyond the tool's point along x, y and z of the camera, m."""
+_GAINS = open_loop.OpenLoopGains()
 _MOVED = 0.02
 """A target that is farther than this from where it was aimed at is aimed at anew, m."""
 _NEAR_ANGLE = math.radians(4.0)
@@ -85,9 +80,8 @@ class OraclePolicy:
             twist = servo_laws.pose_twist(pose, self._waypoint(pose), 4.0, 0.12)
         depth = float(pose[:3, 2] @ (target - pose[:3, 3]))
         self.estimate = Estimate(depth, 1e-6, self._phase)
-        twist = twist / max(1.0, float(np.max(np.abs(twist) / TWIST_LIMITS)))
         gripper = 1.0 if self._phase in ("close", "lift") else -1.0
-        return np.array([*twist / TWIST_LIMITS, gripper], dtype=np.float32)
+        return np.array([*gaze.within_speed(twist) / ROBOT.arm.twist_limits, gripper], dtype=np.float32)
 
     # -- phases --------------------------------------------------------------------------------------------------
 
@@ -124,7 +118,7 @@ class OraclePolicy:
     def _begin(self, phase: str, pose: FloatArray, target: FloatArray, time: float) -> None:
         self._phase, self._phase_start = phase, time
         if phase == "grasp":
-            self._goal = self._grasp_point(pose, target) - pose[:3, :3] @ TOOL_IN_CAMERA
+            self._goal = self._grasp_point(pose, target) - pose[:3, :3] @ ROBOT.tool_in_camera
         elif phase == "lift":
             self._goal = open_loop.lifted(pose, _LIFT_HEIGHT)
         elif phase == "recover":
@@ -158,7 +152,7 @@ class OraclePolicy:
         turns = rolls(directions, grips, self._rotation)
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
         from_base = np.linalg.norm((target + VIEW_DISTANCE * directions)[:, :2], axis=1)
-        strain = 4.0 * np.maximum(0.0, _FOLDED - from_base) + 0.3 * np.abs(turns)
+        strain = 4.0 * np.maximum(0.0, ROBOT.arm.reach.folded - from_base) + 0.3 * np.abs(turns)
         flatness = np.maximum(0.0, np.where(grips < 0, _STEEP, _STEEP_TURNED) - np.arcsin(directions[:, 2]))
         # Flat fingers touch the table, so flatness costs more than the way.
         cost = np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + 1.5 * flatness
@@ -214,9 +208,8 @@ class OraclePolicy:
     def _grasp_point(self, pose: FloatArray, target: FloatArray) -> FloatArray:
         """Where the tool goes, shape (3,), in base: to the target's centre, but neither palm nor fingers touch."""
         point = target - self._back_off(pose[:3, 2]) * pose[:3, 2]
-        lowest = TABLE_HEIGHT + 0.002 + float(np.abs(pose[2, :3]) @ _FINGERS)
-        highest = 2.0 * float(target[2]) - TABLE_HEIGHT - 0.006  # just below the top of what stands on the table
-        point[2] = max(point[2], min(lowest, highest))
+        lowest = open_loop.lowest_grasp(pose, float(target[2]), ROBOT.workspace.table_height, _GAINS)
+        point[2] = max(point[2], lowest)
         return point
 
     def _back_off(self, axis: FloatArray) -> float:
@@ -231,7 +224,7 @@ class OraclePolicy:
             "ball": half[0],
             "duck": 0.0,  # only its body is broad enough to be held; what is above it fits between the fingers
         }[spec.shape]
-        return float(np.clip(depth - _PALM_ROOM, 0.0, 0.02))
+        return float(np.clip(depth - ROBOT.hand.palm_room, 0.0, 0.02))
 
     # -- motions -------------------------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ MUJOCO_FILES = {
     for name in ("pick_sim", "task_model", "contacts", "rendering", "truth_view", "privileged_map")
 }
 FORBIDDEN = {
+    "fixation_gym/robots": ("fixation_gym.envs", "gymnasium", "mujoco", "robosuite", "torch"),
     "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
     "fixation_gym/control": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),
     "fixation_gym/perception": (
@@ -29,6 +30,7 @@ FORBIDDEN = {
     "policies/servo": ("gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.envs", "fixation_gym.evaluation"),
     "fixation_gym/envs": ("torch", "fixation_gym.evaluation", "fixation_gym.experiments", "policies"),
 }
+FORBIDDEN["fixation_gym/robots"] += ("fixation_gym.control", "fixation_gym.geometry", "fixation_gym.perception")
 FORBIDDEN["fixation_gym/geometry"] += ("fixation_gym.control", "fixation_gym.envs")
 FORBIDDEN["fixation_gym/control"] += ("fixation_gym.envs",)
 

@@ -13,30 +13,19 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fixation_gym.geometry.boxes import Box, BoxSet, box_set, joined
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
-# Boxes around the parts of the Panda's hand, in the camera's axes (x right, y down, z forward) with the origin between
-# the finger pads, m; measured on the collision meshes. The last one is the wrist, wherever the arm turns it.
-_PARTS = np.array(
-    [
-        [[-0.067, -0.011, -0.044], [0.067, 0.011, 0.010]],  # fingers
-        [[-0.104, -0.033, -0.123], [0.104, 0.033, -0.031]],  # hand
-        [[-0.046, -0.084, -0.084], [0.046, -0.057, -0.058]],  # camera
-        [[-0.055, -0.045, -0.152], [0.090, 0.045, -0.097]],  # flange
-        [[-0.140, -0.130, -0.285], [0.075, 0.045, -0.152]],  # wrist
-    ]
-)
-_SOLID = len(_PARTS) - 1
-"""Parts whose boxes they fill; the wrist's box holds it in whatever way the arm turns it, so most of it is empty."""
+_PARTS = ROBOT.hand.parts
+_MIDDLES, _HALVES = 0.5 * (_PARTS[:, 0] + _PARTS[:, 1]), 0.5 * (_PARTS[:, 1] - _PARTS[:, 0])
+"""Centres and half sizes of the boxes around the parts of the hand, shape (n, 3), from the tool's point, m."""
 _LAST_STRETCH = 0.12
 """Length of the open-loop motion, m; before it, the target is on the camera's axis and the tool below it."""
 
 
 def near_hand(points: FloatArray, margin: float) -> MaskArray:
     """Which points, shape (n, 3), in ``cam``, m, are within about ``margin`` m of the hand, shape (n,)."""
-    middles, halves = 0.5 * (_PARTS[:, 0] + _PARTS[:, 1]), 0.5 * (_PARTS[:, 1] - _PARTS[:, 0])
-    beyond = np.abs(points[:, None] - TOOL_IN_CAMERA - middles) - halves
+    beyond = np.abs(points[:, None] - ROBOT.tool_in_camera - _MIDDLES) - _HALVES
     return np.any(np.all(beyond < margin, axis=-1), axis=-1)
 
 
@@ -44,14 +33,14 @@ def _swept_boxes(parts: FloatArray) -> FloatArray:
     """Boxes swept by parts: on the approach, below the camera's axis, and on the last stretch, shape (n, 2, 3)."""
     last, approach = parts.copy(), parts.copy()
     last[:, 0, 2] -= _LAST_STRETCH
-    approach[:, :, 1] += TOOL_IN_CAMERA[1]
+    approach[:, :, 1] += ROBOT.tool_in_camera[1]
     approach[:, 1, 2] -= _LAST_STRETCH
     approach[:, 0, 2] = -_SWEEP_LENGTH
     return np.concatenate([last, approach])
 
 
 _SWEEP_LENGTH = 0.45
-_BOXES, _SOLID_BOXES = _swept_boxes(_PARTS), _swept_boxes(_PARTS[:_SOLID])
+_BOXES, _SOLID_BOXES = _swept_boxes(_PARTS), _swept_boxes(_PARTS[:-1])
 
 
 def approach_directions(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
@@ -297,9 +286,8 @@ def _meeting_pairs(
 def hand_boxes(T_base_cam: FloatArray) -> BoxSet:
     """Boxes around the parts of the hand of a camera at a pose, shape (4, 4)."""
     rotation = T_base_cam[:3, :3]
-    tool = T_base_cam[:3, 3] + rotation @ TOOL_IN_CAMERA
-    middles, halves = 0.5 * (_PARTS[:, 0] + _PARTS[:, 1]), 0.5 * (_PARTS[:, 1] - _PARTS[:, 0])
-    return BoxSet(tool + middles @ rotation.T, np.repeat(rotation[None], len(_PARTS), axis=0), halves)
+    tool = T_base_cam[:3, 3] + rotation @ ROBOT.tool_in_camera
+    return BoxSet(tool + _MIDDLES @ rotation.T, np.repeat(rotation[None], len(_MIDDLES), axis=0), _HALVES)
 
 
 @njit(cache=True)

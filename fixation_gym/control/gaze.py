@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fixation_gym.control import servo_laws
-from fixation_gym.control.reach import azimuth_range
-from fixation_gym.robot import TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 
@@ -33,10 +32,6 @@ class GazeGains:
     """Below this distance the gripper is turned across the target's narrow axis, m."""
     level_fade: float = 6.0
     """The hand is levelled fully while the gaze is off the vertical by more than 1 / ``level_fade`` rad."""
-    highest_elevation: float = math.radians(86.0)
-    """Elevation of the gaze at which the arm stops rising; beyond the vertical, up and down change places, rad."""
-    lowest_elevation: float = math.radians(38.0)
-    """Elevation at which it stops sinking, rad."""
     azimuth_slack: float = math.radians(4.0)
     """How far beyond the arm's reach the camera may go around the target, rad."""
     search_rate: float = 0.35
@@ -75,14 +70,14 @@ def within_reach(lateral: FloatArray, T_base_cam: FloatArray, target: FloatArray
     azimuth = (azimuth + math.pi) % (2.0 * math.pi) - math.pi
     # Moving right (+x) around the target raises the azimuth, moving up (-y) raises the elevation.
     height = elevation(T_base_cam)
-    low, high = azimuth_range(height)
+    low, high = ROBOT.arm.reach.azimuths(height)
     slack = gains.azimuth_slack
     v_x = lateral[0]
     if azimuth < low - slack or azimuth > high + slack:
         v_x = max(v_x, 0.0) if azimuth < low else min(v_x, 0.0)
-    v_y = lateral[1]
-    if height > gains.highest_elevation or height < gains.lowest_elevation:
-        v_y = max(v_y, 0.0) if height > gains.highest_elevation else min(v_y, 0.0)
+    v_y, (lowest, highest) = lateral[1], ROBOT.arm.reach.orbit
+    if height > highest or height < lowest:
+        v_y = max(v_y, 0.0) if height > highest else min(v_y, 0.0)
     return np.array([v_x, v_y])
 
 
@@ -118,5 +113,5 @@ def searching_twist(seconds: float, gains: GazeGains) -> FloatArray:
 
 
 def within_speed(twist: FloatArray) -> FloatArray:
-    """Twist, shape (6,), slowed down as a whole to the camera's ``TWIST_LIMITS``, so that it keeps its direction."""
-    return twist / max(1.0, float(np.max(np.abs(twist) / TWIST_LIMITS)))
+    """Twist, shape (6,), slowed down as a whole to what the camera may do, so that it keeps its direction."""
+    return twist / max(1.0, float(np.max(np.abs(twist) / ROBOT.arm.twist_limits)))

@@ -13,7 +13,7 @@ from enum import Enum
 import numpy as np
 
 from fixation_gym.control import servo_laws
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 _LIFT_SLOPE = 0.15
@@ -57,12 +57,8 @@ class OpenLoopGains:
     """Height up to which a turned hand may have to stay, as a share of the point's above the support surface."""
     finger_room: float = 0.002
     """Least height of the open fingers above the support surface, m."""
-    finger_reach: tuple[float, float, float] = (0.050, 0.011, 0.010)
-    """How far the open fingers reach beyond the tool's point along x, y and z of the camera, m."""
     top_room: float = 0.006
     """However flat the fingers come in, the tool stays this far below the top of the target, m."""
-    finger_length: float = 0.043
-    """Distance from the tool back to the palm, which must not touch the target, m."""
     reaim_distance: float = 0.008
     """A grasp is aimed anew when the target is farther than this from where it was, m."""
     grasp_timeout: float = 4.0
@@ -116,12 +112,23 @@ def begin_grasp(T_base_cam: FloatArray, target: Target, time: float, gains: Open
         point[2] = support + gains.grasp_height * (point[2] - support)
     if target.reach is not None:
         axis = T_base_cam[:3, 2]
-        point -= axis * max(0.0, target.reach + float(axis @ (point - target.point)) - gains.finger_length)
+        point -= axis * max(0.0, target.reach + float(axis @ (point - target.point)) - ROBOT.hand.finger_length)
     if support is not None:
-        lowest = support + gains.finger_room + float(np.abs(T_base_cam[2, :3]) @ gains.finger_reach)
-        highest = 2.0 * float(target.point[2]) - support - gains.top_room
-        point[2] = max(point[2], min(lowest, highest))
-    return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ TOOL_IN_CAMERA)
+        point[2] = max(point[2], lowest_grasp(T_base_cam, float(target.point[2]), support, gains))
+    return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ ROBOT.tool_in_camera)
+
+
+def lowest_grasp(T_base_cam: FloatArray, centre_height: float, support: float, gains: OpenLoopGains) -> float:
+    """Least height of the tool in base, m, at which the open fingers keep off the table, but within the target.
+
+    Args:
+        T_base_cam: camera pose, shape (4, 4).
+        centre_height: of the target's centre in base, m.
+        support: height of the table in base, m.
+        gains: numbers of the manoeuvre.
+    """
+    lowest = support + gains.finger_room + float(np.abs(T_base_cam[2, :3]) @ ROBOT.hand.finger_reach)
+    return min(lowest, 2.0 * centre_height - support - gains.top_room)
 
 
 def largest_roll(T_base_cam: FloatArray, target: Target, gains: OpenLoopGains) -> float:
@@ -139,7 +146,7 @@ def largest_roll(T_base_cam: FloatArray, target: Target, gains: OpenLoopGains) -
         return math.pi / 2.0
     flat, steep = math.hypot(T_base_cam[2, 0], T_base_cam[2, 1]), abs(float(T_base_cam[2, 2]))
     rolls = np.linspace(0.0, math.pi / 2.0, 91)
-    along, across, ahead = gains.finger_reach
+    along, across, ahead = ROBOT.hand.finger_reach
     lowest = gains.finger_room + flat * (along * np.sin(rolls) + across * np.cos(rolls)) + steep * ahead
     highest = gains.highest_grasp * (float(target.point[2]) - target.support_height)
     return float(rolls[max(1, int(np.count_nonzero(np.maximum.accumulate(lowest) <= highest))) - 1])

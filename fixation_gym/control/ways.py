@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fixation_gym.control.corridor import in_corridor, level_axes
-from fixation_gym.control.reach import REACH_GRID, azimuth_range, directions
+from fixation_gym.control.reach import REACH_GRID, directions
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
 _RADII = (0.08, 0.13, 0.18, 0.23, 0.28, 0.33)
@@ -46,8 +47,6 @@ class WayCosts:
     """At the border of the arm's reach."""
     wide: float = 0.8
     """Where the fingers, however the hand turns, do not get around the target."""
-    finger_span: tuple[float, float] = (0.077, 0.082)
-    """Widths of the target for which they get around it for sure, and not at all, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +178,7 @@ def way_costs(
     unseen = costs.unseen * np.minimum(ways.unseen / costs.much_unseen, 1.0)
     arm = costs.strain * _AT_BORDER + costs.low * _LOW
     if widths is not None:
-        sure, never = costs.finger_span
+        sure, never = ROBOT.hand.finger_span
         arm = arm + costs.wide * np.clip((widths - sure) / (never - sure), 0.0, 1.0)
     return turn + blocked + unseen + costs.tried * again + arm
 
@@ -224,7 +223,7 @@ def _at_border() -> FloatArray:
     """1 for ways at the border of the reach in azimuth, 0 within, shape (ways,)."""
     border = []
     for azimuth, elevation in REACH_GRID:
-        low, high = azimuth_range(float(elevation))
+        low, high = ROBOT.arm.reach.azimuths(float(elevation))
         border.append(min(azimuth - low, high - azimuth) < 0.05)
     return np.array(border, dtype=np.float64)
 

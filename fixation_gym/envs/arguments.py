@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
+
+WIDEST = 1.25 * ROBOT.hand.opening
+"""Bound of the measured opening between the finger pads, m."""
 
 
 def checked_image_size(image_size: Any) -> tuple[int, int] | None:
@@ -64,9 +68,9 @@ def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
     return spaces.Dict(
         image
         | {
-            "joint_pos": box(*[4.0] * 7),
-            "joint_vel": box(*[10.0] * 7),
-            "gripper_width": spaces.Box(0.0, 0.1, (1,), np.float32),
+            "joint_pos": box(*[4.0] * ROBOT.arm.joints),
+            "joint_vel": box(*[10.0] * ROBOT.arm.joints),
+            "gripper_width": spaces.Box(0.0, WIDEST, (1,), np.float32),
             "camera_pose": box(*[2.0] * 3, *[1.0] * 4),
             "camera_twist": box(*[5.0] * 3, *[20.0] * 3),
             "time": spaces.Box(0.0, 3600.0, (1,), np.float32),

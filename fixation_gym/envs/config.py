@@ -8,6 +8,7 @@ from typing import Any
 
 from fixation_gym.envs.object_pool import MAX_OBSTACLES, TARGET_SHAPES
 from fixation_gym.envs.obstacle_kinds import KIND_NAMES, MATERIALS
+from fixation_gym.robots import ROBOT
 
 CONTROL_FREQUENCY = 25
 """Control steps per second."""
@@ -41,14 +42,14 @@ class Scenario:
     """Kinds of the first obstacle; none: any of ``obstacle_kinds``."""
     obstacle_count: tuple[int, int] = (0, 0)
     """Smallest and largest number of obstacles that stand still, inclusive."""
-    free_elevation_deg: tuple[float, float] = (40.0, 85.0)
+    free_elevation_deg: tuple[float, float] = ROBOT.arm.reach.elevations_deg
     """Range of the elevation of the way that is left free, deg."""
     moving_count: tuple[int, int] = (0, 0)
     """Smallest and largest number of obstacles that move, inclusive."""
     alpha: tuple[float, float] = (0.3, 0.7)
     """Range of the opacity of see-through obstacles."""
     target_shapes: tuple[str, ...] = tuple(shape.name for shape in TARGET_SHAPES)
-    grasp_width: tuple[float, float] = (0.025, 0.07)
+    grasp_width: tuple[float, float] = ROBOT.hand.grasp_widths
     """Range of the target's width between the fingers, m."""
     view_elevation_deg: tuple[float, float] = (40.0, 60.0)
     """Range of the angle by which the camera first looks down at the target, deg."""
@@ -86,9 +87,9 @@ class Scenario:
             _require_range(name, getattr(self, name), 0, MAX_OBSTACLES)
             if not all(isinstance(count, int) for count in getattr(self, name)):
                 raise ValueError(f"{name} must be two whole numbers, got {getattr(self, name)}")
-        _require_range("grasp_width", self.grasp_width, 0.025, 0.07)
+        _require_range("grasp_width", self.grasp_width, *ROBOT.hand.grasp_widths)
         _require_range("alpha", self.alpha, 0.0, 1.0)
-        _require_range("free_elevation_deg", self.free_elevation_deg, 40.0, 85.0)
+        _require_range("free_elevation_deg", self.free_elevation_deg, *ROBOT.arm.reach.elevations_deg)
         _require_range("view_elevation_deg", self.view_elevation_deg, 30.0, 60.0)
         _require_names("obstacle_motions", self.obstacle_motions, OBSTACLE_MOTIONS)
         _require_range("drive_speed", self.drive_speed, 0.01, 0.10)
@@ -143,6 +144,12 @@ def _require_probability(field: str, value: float) -> None:
         raise ValueError(f"{field} must be a number within 0..1, got {value!r}")
 
 
+def _reached(low: float, high: float) -> tuple[float, float]:
+    """What the arm reaches of a range of elevations, deg."""
+    lowest, highest = ROBOT.arm.reach.elevations_deg
+    return min(max(low, lowest), highest), max(min(high, highest), lowest)
+
+
 _SCREEN = Scenario(
     "screen",
     ("translucent",),
@@ -182,14 +189,14 @@ SCENARIOS: dict[str, Scenario] = {
             ("opaque", "translucent", "wire"),
             first_kinds=("cabinet", "shelf", "roof"),
             obstacle_count=(2, 6),
-            free_elevation_deg=(40.0, 70.0),
+            free_elevation_deg=_reached(40.0, 70.0),
         ),
         Scenario(
             "bin",
             ("opaque", "translucent", "wire"),
             first_kinds=("bin",),
             obstacle_count=(2, 6),
-            free_elevation_deg=(46.0, 82.0),
+            free_elevation_deg=_reached(46.0, 82.0),
         ),
         Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
         Scenario(

@@ -12,12 +12,11 @@ from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.placement import Room, sample_push
-from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, TargetSpec
+from fixation_gym.envs.scene import TargetSpec
 from fixation_gym.geometry.boxes import box_set
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
-_PUSHED_REGION = ((0.46, 0.66), (-0.18, 0.18))
-"""Ranges of x and y in which a push may leave the target, in base, m."""
 _CONE = math.radians(5.0)
 """Half angle of the cone of free ways, rad."""
 _NEAR_FREE = math.radians(12.0)
@@ -89,17 +88,18 @@ def sample_target(scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
     height_ratio = min(1.0, ratio * rng.uniform(1.0, 1.6)) if slender else ratio
     length_ratio = min(1.0, ratio * rng.uniform(1.0, 1.3)) if shape.name == "box" else ratio
     scale = (float(length_ratio), float(ratio), float(height_ratio))
-    x, y = (rng.uniform(*bounds) for bounds in TARGET_REGION)
-    z = TABLE_HEIGHT + shape.half_extent[2] * height_ratio
+    x, y = (rng.uniform(*bounds) for bounds in ROBOT.workspace.targets)
+    z = ROBOT.workspace.table_height + shape.half_extent[2] * height_ratio
     return TargetSpec(shape.name, scale, (float(x), float(y), float(z)), float(rng.uniform(-math.pi, math.pi)))
 
 
 def _pushed(target: TargetSpec, scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
     """The target with a push that leaves it within reach."""
+    region = ROBOT.workspace.pushed_targets
     while True:
         motion = sample_push(scenario.target_push, scenario.push_time, rng.uniform(-math.pi, math.pi), rng)
         end = np.add(target.position[:2], motion.displacement)
-        if all(low < value < high for value, (low, high) in zip(end, _PUSHED_REGION, strict=True)):
+        if all(low < value < high for value, (low, high) in zip(end, region, strict=True)):
             return replace(target, motion=motion)
 
 

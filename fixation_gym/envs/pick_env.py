@@ -19,7 +19,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.percept import Percept
-from fixation_gym.robot import CAMERA_FOVY, HAND_EYE, TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
 
 if TYPE_CHECKING:
@@ -108,8 +108,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         require_choice("reward", reward, rewards.REWARDS)
         self.render_mode, self.render_view = render_mode, render_view
         self.metadata = self.metadata | {"render_fps": control_frequency}
-        self.intrinsics = Intrinsics.from_fovy(*(self._image_size or config.IMAGE_SIZE), CAMERA_FOVY)
-        self.hand_eye = HAND_EYE
+        self.intrinsics = Intrinsics.from_fovy(*(self._image_size or config.IMAGE_SIZE), ROBOT.camera.fovy)
+        self.hand_eye = ROBOT.camera.hand_eye
         self.control_frequency = control_frequency
         self._reward_terms = rewards.dense_terms if reward == "dense" else rewards.sparse_terms
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
@@ -159,7 +159,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         action = checked_action(action, 7)
         sim = self.sim
         latency = round(self.noise.image_latency_s / sim.model.opt.timestep)
-        exposed, hit = sim.step(action[:6] * TWIST_LIMITS, float(action[6]), sim.substeps - latency)
+        exposed, hit = sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]), sim.substeps - latency)
         self._steps += 1
         self._collided = self._collided or hit or sim.obstacle_push() > config.COLLISION_PUSH
         self._steps_lifted = self._steps_lifted + 1 if sim.target_rise() >= config.LIFT_HEIGHT else 0

@@ -24,15 +24,12 @@ from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.scene_loader import SceneLoader
 from fixation_gym.envs.task_model import compile_model
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.robot import HAND_EYE, TOOL_IN_HAND
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
-POSTURE = np.array([-0.3, 0.07, -0.35, -2.5, 1.1, 2.28, -1.5])
-"""Joint angles, rad, from which the start pose is sought and towards which the arm's redundancy drifts."""
-JOINT_SPEED = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])
-"""Franka's joint speed limits, rad/s."""
-_GRIPPER_SPEED = 0.10
-"""Closing speed of one finger, m/s."""
+_JOINTS = ROBOT.arm.joints
+_OPEN = 0.5 * ROBOT.hand.opening
+"""Way of one finger, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +41,7 @@ class ArmState:
     camera_pose: FloatArray
     """T_base_cam, shape (4, 4)."""
     jacobian: FloatArray
-    """Camera twist expressed in ``cam`` per joint velocity, shape (6, 7)."""
+    """Camera twist expressed in ``cam`` per joint velocity, shape (6, n)."""
     gripper_width: float
 
 
@@ -52,16 +49,19 @@ class PickSim:
     """MuJoCo simulation of the pick task: reset to a scene, step by a camera twist, read the truth."""
 
     def __init__(
-        self, control_frequency: int, extend: SceneExtension | None = None, posture: FloatArray = POSTURE
+        self,
+        control_frequency: int,
+        extend: SceneExtension | None = None,
+        posture: tuple[float, ...] = ROBOT.arm.posture,
     ) -> None:
         """Build and compile the model once; ``reset`` reuses it.
 
         Args:
             control_frequency: calls of ``step`` per second.
             extend: adds an experiment's own things to the model.
-            posture: joint angles, shape (7,), rad, with the role of ``POSTURE``.
+            posture: joint angles from which start poses are sought and towards which the redundancy drifts, rad.
         """
-        self._posture = posture
+        self._posture = np.array(posture)
         self._control_frequency, self._extend = control_frequency, extend
         self._compiled = compile_model(control_frequency, extend)
         self.model: Any = self._compiled.model
@@ -73,33 +73,34 @@ class PickSim:
         mujoco.mj_kinematics(model, self.data)
         self._base_position = self.data.xpos[base].copy()
         assert np.allclose(self.data.xmat[base].reshape(3, 3), np.eye(3)), "base frame is assumed parallel to the world"
-        self._arm = slice(0, 7)
-        self._fingers = slice(7, 9)
-        lower, upper = model.jnt_range[:7].T
-        self._limits = JointLimits(lower + 0.02, upper - 0.02, JOINT_SPEED)
-        joints = np.array([posture, *self._limits, *model.actuator_ctrlrange[:7].T])
-        self._task = ArmTask(HAND_EYE, joints, model.opt.timestep)
+        self._arm = slice(0, _JOINTS)
+        self._fingers = slice(_JOINTS, _JOINTS + 2)
+        lower, upper = model.jnt_range[self._arm].T
+        self._limits = JointLimits(lower + 0.02, upper - 0.02, np.array(ROBOT.arm.joint_speeds))
+        joints = np.array([posture, *self._limits, *model.actuator_ctrlrange[self._arm].T])
+        self._task = ArmTask(ROBOT.camera.hand_eye, joints, model.opt.timestep)
         self._arm_dynamics = self._view_arm()
         self._loader = SceneLoader(model)
         self._display: tuple[Any, SceneLoader] | None = None
-        self._joint_command = np.zeros(7)
+        self._joint_command = np.zeros(_JOINTS)
         self.obstacles: tuple[str, ...] = ()
         self._movers: tuple[Mover, ...] = ()
 
     def _view_arm(self) -> ArmDynamics:
         """Views into the simulator's arrays; the arm's joints are the first of the model and form one chain."""
-        model, data = self.model, self.data
-        assert np.array_equal(model.dof_parentid[:7], np.arange(-1, 6)), "mass matrix is read as that of a chain"
+        model, data, arm = self.model, self.data, self._arm
+        parents = np.arange(-1, _JOINTS - 1)
+        assert np.array_equal(model.dof_parentid[arm], parents), "mass matrix is read as that of a chain"
         return ArmDynamics(
-            joint_pos=data.qpos[:7],
-            joint_vel=data.qvel[:7],
-            anchors=data.xanchor[:7],
-            axes=data.xaxis[:7],
+            joint_pos=data.qpos[arm],
+            joint_vel=data.qvel[arm],
+            anchors=data.xanchor[arm],
+            axes=data.xaxis[arm],
             hand_position=data.xpos[self._hand],
             hand_rotation=data.xmat[self._hand].reshape(3, 3),
-            mass=data.qM[:28],
-            bias=data.qfrc_bias[:7],
-            passive=data.qfrc_passive[:7],
+            mass=data.qM[: _JOINTS * (_JOINTS + 1) // 2],
+            bias=data.qfrc_bias[arm],
+            passive=data.qfrc_passive[arm],
         )
 
     # -- reset and step ------------------------------------------------------------------------------------------
@@ -125,7 +126,7 @@ class PickSim:
         self.obstacles = tuple(body for body in placed if body.startswith("obstacle"))
         self._colliding = contacts.colliding_geoms(model, self._compiled.owners)
         start = look_at(np.array(scene.camera_position), np.array(scene.gaze_point), np.array([0.0, 0.0, 1.0]))
-        data.qpos[self._fingers] = data.ctrl[7:9] = [0.04, -0.04]
+        data.qpos[self._fingers] = data.ctrl[self._fingers] = [_OPEN, -_OPEN]
         data.qpos[self._arm] = self._joint_command[:] = self._inverse_kinematics(start)
         mujoco.mj_forward(model, data)
         self._rest = {body: self.body_position(body) for body in placed}
@@ -169,7 +170,7 @@ class PickSim:
             qpos at the exposure, and whether the robot hit an obstacle or the table.
         """
         model, data = self.model, self.data
-        finger_step = _GRIPPER_SPEED * model.opt.timestep * float(np.sign(gripper))
+        finger_step = ROBOT.hand.finger_speed * model.opt.timestep * float(np.sign(gripper))
         arm, torques, fingers = self._arm_dynamics, data.ctrl[self._arm], data.ctrl[self._fingers]
         finger, movers = float(fingers[0]), self._movers
         collided = False
@@ -180,7 +181,7 @@ class PickSim:
             mujoco.mj_step1(model, data)
             arm_torques(arm, self._task, camera_twist, self._joint_command, torques)
             if finger_step:
-                finger = min(max(finger - finger_step, 0.0), 0.04)
+                finger = min(max(finger - finger_step, 0.0), _OPEN)
                 fingers[:] = finger, -finger
             mujoco.mj_step2(model, data)
             if not collided:
@@ -205,10 +206,10 @@ class PickSim:
     def arm_state(self) -> ArmState:
         """State of the arm as the last kinematics computed it."""
         arm = self._arm_dynamics
-        pose, jacobian = camera_kinematics(arm, HAND_EYE)
+        pose, jacobian = camera_kinematics(arm, ROBOT.camera.hand_eye)
         pose[:3, 3] -= self._base_position
-        width = float(self.data.qpos[7] - self.data.qpos[8])
-        return ArmState(arm.joint_pos.copy(), arm.joint_vel.copy(), pose, jacobian, width)
+        left, right = self.data.qpos[self._fingers]
+        return ArmState(arm.joint_pos.copy(), arm.joint_vel.copy(), pose, jacobian, float(left - right))
 
     def body_position(self, body: str) -> FloatArray:
         """Centre of a pool body in base, shape (3,), m."""
@@ -217,7 +218,7 @@ class PickSim:
     def tool_position(self) -> FloatArray:
         """Point between the finger pads in base, shape (3,), m."""
         hand = self.data.xmat[self._hand].reshape(3, 3)
-        return self.data.xpos[self._hand] + hand @ TOOL_IN_HAND - self._base_position
+        return self.data.xpos[self._hand] + hand @ ROBOT.hand.tool - self._base_position
 
     def target_rise(self) -> float:
         """Height of the target above where it rested at reset, m."""

@@ -12,9 +12,10 @@ from fixation_gym.control.corridor import any_meets, any_pair_meets, swept_hand
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.obstacle_kinds import ObstacleKind, kinds_of
-from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
+from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.envs.shapes import Part, Shape, Vector, centred, placed_boxes
 from fixation_gym.geometry.boxes import Box, BoxSet
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
@@ -30,8 +31,6 @@ _LEAST_MASS, _LARGEST_MASS = 0.3, 1.5
 _ORBIT = 0.355
 """What is seen above a slope of ``_FLAT`` from the target stays this near, m: the hand goes around farther out."""
 _FLAT = 0.5
-_TABLE = ((0.24, 0.90), (-0.36, 0.36))
-"""Ranges of x and y of the table top on which things stand, in base, m."""
 _TARGET_GAP, OBSTACLE_GAP = 0.012, 0.006
 """Least room between an obstacle and red things, and between obstacles, m."""
 FREE_ROOM = 0.01
@@ -101,7 +100,7 @@ class Draft:
         """The shape, and where its centre is in base."""
         shape, (x, y, _) = centred(self.kind.name, self.parts, 1.0)
         c, s = math.cos(self.facing), math.sin(self.facing)
-        height = TABLE_HEIGHT + shape.half_extent[2]
+        height = ROBOT.workspace.table_height + shape.half_extent[2]
         return shape, (self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y, height)
 
 
@@ -121,7 +120,7 @@ def draw_obstacle(
     """
     x, y = float(target[0]) - distance * math.cos(bearing), float(target[1]) - distance * math.sin(bearing)
     facing = bearing + rng.uniform(-0.4, 0.4) + (math.pi if kind.around else 0.0)
-    parts, origin = kind.draw(material, rng), (x, y, TABLE_HEIGHT)
+    parts, origin = kind.draw(material, rng), (x, y, ROBOT.workspace.table_height)
     return Draft(kind, material, parts, origin, facing, placed_boxes(parts, origin, facing))
 
 
@@ -172,7 +171,8 @@ class Room:
             most: largest number of steps.
         """
         centres, halves = swept_hand(FREE_ROOM)
-        steps = _first_place(*boxes, step, most, self.reds, self.ends, self.ways, centres, halves)
+        table = np.array(ROBOT.workspace.table)
+        steps = _first_place(*boxes, step, most, table, self.reds, self.ends, self.ways, centres, halves)
         return None if steps < 0 else int(steps)
 
     def holds(self, boxes: BoxSet) -> bool:
@@ -187,6 +187,7 @@ def _first_place(
     halves: FloatArray,
     step: FloatArray,
     most: int,
+    table: FloatArray,
     reds: BoxSet,
     ends: FloatArray,
     ways: FloatArray,
@@ -196,7 +197,7 @@ def _first_place(
     """The compiled part of ``Room.first_place``; -1: none."""
     for count in range(most + 1):
         centres = places + count * step
-        if not _within_bounds(centres, turns, halves, reds[0][0]):
+        if not _within_bounds(centres, turns, halves, table, reds[0][0]):
             continue
         if any_pair_meets(centres, turns, halves + _TARGET_GAP, reds[0], reds[1], reds[2]):
             continue
@@ -210,8 +211,13 @@ def _first_place(
 
 
 @njit(cache=True)
-def _within_bounds(centres: FloatArray, rotations: FloatArray, halves: FloatArray, target: FloatArray) -> bool:
-    """Whether boxes are above the table, and within ``_ORBIT`` of the target if the hand might meet them there."""
+def _within_bounds(
+    centres: FloatArray, rotations: FloatArray, halves: FloatArray, table: FloatArray, target: FloatArray
+) -> bool:
+    """Whether boxes are above the table, and within ``_ORBIT`` of the target if the hand might meet them there.
+
+    The table is an argument, (low, high) of x and y: what is compiled keeps the constants that it once saw.
+    """
     for i in range(len(centres)):
         low, high = centres[i].copy(), centres[i].copy()
         for axis in range(3):
@@ -221,7 +227,7 @@ def _within_bounds(centres: FloatArray, rotations: FloatArray, halves: FloatArra
             low[axis] -= reach
             high[axis] += reach
         for axis in range(2):
-            if low[axis] < _TABLE[axis][0] or high[axis] > _TABLE[axis][1]:
+            if low[axis] < table[axis, 0] or high[axis] > table[axis, 1]:
                 return False
         x = max(abs(low[0] - target[0]), abs(high[0] - target[0]))
         y = max(abs(low[1] - target[1]), abs(high[1] - target[1]))

@@ -1,4 +1,4 @@
-"""The only file that knows robosuite: its Panda, gripper and table, with the object pool, as one MuJoCo model."""
+"""The only file that knows robosuite: its arm, gripper and table, with the object pool, as one MuJoCo model."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fixation_gym.envs import scene_mjcf
+from fixation_gym.robots import ROBOT
 
 # On import robosuite warns of optional parts (other robots, whole-body IK) that are not used here.
 _disabled_before = logging.root.manager.disable
@@ -26,7 +27,8 @@ _TABLE_SIZE = (0.8, 0.8, 0.05)
 _TABLE_OFFSET = (0.0, 0.0, 0.8)
 ROBOT_BODIES = ("robot0_", "gripper0_", "fixed_mount0_")
 """Beginnings of the names of the robot's bodies."""
-BASE_BODY, HAND_BODY = "robot0_link0", "robot0_right_hand"
+_FIRST_LINK = f"robot0_{ROBOT.simulated.first_link}"
+BASE_BODY, HAND_BODY = f"robot0_{ROBOT.simulated.base}", "robot0_right_hand"
 SceneExtension = Callable[[ET.Element, ET.Element], None]
 """Adds an experiment's own things to the MJCF elements ``asset`` and ``worldbody``."""
 
@@ -39,7 +41,7 @@ class _Scene(ManipulationTask):
 
 
 class _FixationPickTask(ManipulationEnv):
-    """robosuite task: Panda at a table with the object pool. Only builds the model; ``PickSim`` steps it."""
+    """robosuite task: the robot at a table with the object pool. Only builds the model; ``PickSim`` steps it."""
 
     def __init__(self, extend: SceneExtension | None, looks: bool, **options: Any) -> None:
         self._extend, self._looks = extend, looks  # the base class loads the model
@@ -63,7 +65,7 @@ class _FixationPickTask(ManipulationEnv):
         scene_mjcf.draw_last(worldbody)
         if not self._looks:
             scene_mjcf.remove_looks(self.model.asset, worldbody, ROBOT_BODIES)
-        ET.SubElement(self.model.contact, "exclude", {"body1": BASE_BODY, "body2": "robot0_link1"})
+        ET.SubElement(self.model.contact, "exclude", {"body1": BASE_BODY, "body2": _FIRST_LINK})
 
     def reward(self, action: Any = None) -> float:
         """Rewards are the business of the Gymnasium environment."""
@@ -84,7 +86,8 @@ def build_model(control_frequency: int, extend: SceneExtension | None, looks: bo
     task: Any = _FixationPickTask(
         extend,
         looks,
-        robots="Panda",
+        robots=ROBOT.simulated.robot,
+        gripper_types=ROBOT.simulated.gripper,
         has_offscreen_renderer=False,
         use_camera_obs=False,
         hard_reset=False,

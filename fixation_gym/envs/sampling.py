@@ -25,14 +25,11 @@ from fixation_gym.envs.placement import FREE_ROOM
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
 from fixation_gym.envs.shapes import Vector
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
-_VIEW_AZIMUTHS = (math.radians(30.0), math.radians(82.0))
-"""Range of the azimuth of the first view against the target's bearing, rad: the arm can start there at any height."""
 _VIEW_DISTANCE = (0.42, 0.49)
 """Range of the distance between camera and target at the start, m."""
-_FOLDED = 0.36
-"""Nearer to the base's axis the arm does not start, m."""
 _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
 _TARGET_TEXTURES = ("bricks", "wood_light", "metal")
@@ -134,11 +131,12 @@ def _scene(
 def _sample_view(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> View | None:
     """Draw the first view, and another red thing if there is to be one; None if that does not fit."""
     centre = np.array(goal.target.position)
+    reach = ROBOT.arm.reach
     low, high = (math.radians(angle) for angle in scenario.view_elevation_deg)
-    azimuth, elevation = rng.uniform(*_VIEW_AZIMUTHS), rng.uniform(low, high)
+    azimuth, elevation = rng.uniform(*np.radians(reach.start_deg)), rng.uniform(low, high)
     direction = Way(math.atan2(centre[1], centre[0]) + azimuth, elevation).direction
     camera = centre + rng.uniform(*_VIEW_DISTANCE) * direction
-    if math.hypot(camera[0], camera[1]) < _FOLDED:
+    if math.hypot(camera[0], camera[1]) < reach.folded:
         return None
     gaze = centre + rng.uniform(-0.06, 0.06, 3) * [1.0, 1.0, 0.0]
     distractor = None

@@ -12,10 +12,6 @@ from fixation_gym.envs.shapes import Shape, Vector
 from fixation_gym.geometry.boxes import Box, BoxSet, joined
 from fixation_gym.types import FloatArray
 
-TABLE_HEIGHT = -0.112
-"""Height of the table top in the robot base frame, m."""
-TARGET_REGION = ((0.50, 0.62), (-0.14, 0.14))
-"""Ranges of x and y in which the target is placed, in base, m."""
 RED = (0.80, 0.06, 0.05, 1.0)
 """Colour of targets and distractors, where it is not drawn."""
 UNTINTED = (1.0, 1.0, 1.0, 1.0)

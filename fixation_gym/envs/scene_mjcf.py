@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from fixation_gym.envs.object_pool import SLOTS, TARGET_SHAPES
 from fixation_gym.envs.shapes import Part, Shape
-from fixation_gym.robot import CAMERA_FOVY, CAMERA_IN_HAND
+from fixation_gym.robots import ROBOT
 
 CAMERA_NAME = "wrist"
 FRONT_CAMERA_NAME = "front"
@@ -57,12 +57,14 @@ def add_materials(asset: ET.Element, texture_path: Callable[[str], str]) -> None
 
 def add_wrist_camera(hand: ET.Element) -> None:
     """Mount the camera and its housing on the hand body."""
-    x, y, z = CAMERA_IN_HAND
+    mount = ROBOT.camera
+    x, y, z = mount.in_hand
     camera = {"name": CAMERA_NAME, "mode": "fixed", "pos": f"{x} {y} {z}", "quat": "0 0.70710678 0.70710678 0"}
-    ET.SubElement(hand, "camera", camera | {"fovy": str(math.degrees(CAMERA_FOVY))})
-    # A RealSense D435 is 90 x 25 x 25 mm; its front lies just behind the optical centre.
-    housing = {"name": "camera_housing", "type": "box", "size": "0.0125 0.045 0.0125", "mass": "0.07"}
-    ET.SubElement(hand, "geom", housing | {"pos": f"{x} {y} {z - 0.014}", "rgba": "0.2 0.2 0.22 1", "group": "1"})
+    ET.SubElement(hand, "camera", camera | {"fovy": str(math.degrees(mount.fovy))})
+    half_x, half_y, half_z = mount.housing  # the image's x axis is the hand's y axis
+    housing = {"name": "camera_housing", "type": "box", "size": f"{half_y} {half_x} {half_z}", "mass": str(mount.mass)}
+    place = {"pos": f"{x} {y} {z - mount.housing_behind}", "rgba": "0.2 0.2 0.22 1", "group": "1"}
+    ET.SubElement(hand, "geom", housing | place)
 
 
 def add_object_pool(worldbody: ET.Element) -> None:

@@ -42,10 +42,10 @@ def draw_episode_errors(noise: SensorNoise, rng: np.random.Generator) -> Episode
 def measure_joints(
     joint_pos: FloatArray, joint_vel: FloatArray, noise: SensorNoise, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Encoder readings of joint angles and velocities, each of shape (7,), rad and rad/s."""
+    """Encoder readings of joint angles and velocities, each of shape (n,), rad and rad/s."""
     return (
-        joint_pos + noise.joint_pos_rad * rng.standard_normal(7),
-        joint_vel + noise.joint_vel_rad_s * rng.standard_normal(7),
+        joint_pos + noise.joint_pos_rad * rng.standard_normal(len(joint_pos)),
+        joint_vel + noise.joint_vel_rad_s * rng.standard_normal(len(joint_vel)),
     )
 
 
@@ -54,7 +54,7 @@ def measure_camera_pose(
 ) -> FloatArray:
     """Camera pose that kinematics gives for erroneous joint angles, shape (4, 4).
 
-    The joint errors are below 1e-3 rad, so their effect is taken to first order through the Jacobian, (6, 7) in cam.
+    The joint errors are below 1e-3 rad, so their effect is taken to first order through the Jacobian, (6, n) in cam.
     """
     motion = jacobian @ joint_error + hand_eye
     pose = np.array(T_base_cam)

@@ -12,9 +12,8 @@ from typing import Literal
 import numpy as np
 
 from fixation_gym.geometry.boxes import BoxSet, rotations
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, Vector
 
-Vector = tuple[float, float, float]
 Primitive = Literal["box", "cylinder", "sphere", "ellipsoid"]
 Finish = Literal["solid", "glass", "rim", "label", "mirror"]
 

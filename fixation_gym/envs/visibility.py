@@ -9,7 +9,7 @@ import numpy as np
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
 from fixation_gym.geometry.boxes import Box
-from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
 _CLEAR = 0.45
@@ -33,7 +33,7 @@ def is_seen(obstacle: ObstacleSpec, T_base_cam: FloatArray, others: list[Obstacl
     points = boxes.centres[:, None] + np.einsum("nij,nkj->nki", boxes.rotations, corners * boxes.halves[:, None])
     points = points.reshape(-1, 3)
     local = (points - T_base_cam[:3, 3]) @ T_base_cam[:3, :3]
-    tangent = math.tan(CAMERA_FOVY / 2)
+    tangent = math.tan(ROBOT.camera.fovy / 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         inside = (local[:, 2] > 0.05) & (np.abs(local[:, 1]) < tangent * local[:, 2])
         inside &= np.abs(local[:, 0]) < _ASPECT * tangent * local[:, 2]

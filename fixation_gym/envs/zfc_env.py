@@ -12,7 +12,6 @@ from gymnasium.envs.registration import EnvSpec
 from fixation_gym.control.open_loop import OpenLoopGains
 from fixation_gym.envs.arguments import checked_action, require_choice
 from fixation_gym.envs.pick_env import FixationPickEnv
-from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.envs.zfc_observation import (
     OBSERVATIONS,
     fixation_vector,
@@ -22,7 +21,7 @@ from fixation_gym.envs.zfc_observation import (
 from fixation_gym.fixator import Fixator, FixatorGains, action_of
 from fixation_gym.perception.detection.box_tracker import BoxTracker
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.robot import MAX_LINEAR_SPEED
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
 
 _GAINS = FixatorGains(open_loop=OpenLoopGains(hold_seconds=3.0))
@@ -101,7 +100,8 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
         self.observation_space = zfc_observation_space(observation, (env.intrinsics.height, env.intrinsics.width))
         self._shown = observation
         detector = BoxTracker(env.intrinsics) if env.scenario.any_colour else None
-        self._fixator = Fixator(Perception(env.intrinsics, support_height_m=TABLE_HEIGHT, detector=detector), _GAINS)
+        table = ROBOT.workspace.table_height
+        self._fixator = Fixator(Perception(env.intrinsics, support_height_m=table, detector=detector), _GAINS)
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -127,7 +127,7 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
             ValueError: if the action has the wrong shape or holds NaN or infinity.
         """
         action = checked_action(action, 4)
-        command = self._fixator.steer(action[:3] * MAX_LINEAR_SPEED, grasp=bool(action[3] > 0.0))
+        command = self._fixator.steer(action[:3] * ROBOT.arm.linear_speed, grasp=bool(action[3] > 0.0))
         observation, reward, terminated, truncated, info = self.env.step(action_of(command))
         return self._observation(observation, info), float(reward), terminated, truncated, info
 

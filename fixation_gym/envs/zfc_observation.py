@@ -9,8 +9,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fixation_gym.control.open_loop import Stage
+from fixation_gym.envs.arguments import WIDEST
 from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, Observation
 
 OBSERVATIONS = ("zfc", "blind", "rgb", "privileged")
@@ -20,9 +22,9 @@ _STAGES = tuple(Stage)
 _FIXATION = spaces.Box(
     np.array([-2.0, -2.0, 0.0, 0.0, 0.0], np.float32), np.array([2.0, 2.0, 1.0, 5.0, 5.0], np.float32)
 )
-_PROPRIO_HIGH = np.repeat(np.array([4.0, 2.0, 1.0, 5.0, 20.0, 0.1, 1.0], np.float32), [7, 3, 3, 3, 3, 1, len(_STAGES)])
-_PROPRIO_LOW = -_PROPRIO_HIGH
-_PROPRIO_LOW[19:] = 0.0
+_SIZES = [ROBOT.arm.joints, 3, 3, 3, 3, 1, len(_STAGES)]
+_PROPRIO_HIGH = np.repeat(np.array([4.0, 2.0, 1.0, 5.0, 20.0, WIDEST, 1.0], np.float32), _SIZES)
+_PROPRIO_LOW = np.repeat(np.array([-4.0, -2.0, -1.0, -5.0, -20.0, 0.0, 0.0], np.float32), _SIZES)
 _PROPRIO = spaces.Box(_PROPRIO_LOW, _PROPRIO_HIGH)
 
 

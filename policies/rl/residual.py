@@ -18,7 +18,7 @@ from fixation_gym.envs.zfc_observation import fixation_vector, proprio_vector, z
 from fixation_gym.geometry.rigid import pose_to_matrix
 from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.percept import Percept
-from fixation_gym.robot import MAX_LINEAR_SPEED, TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Command, FloatArray, Observation
 from policies.catalogue import make_policy
 from policies.servo.phases import Phase
@@ -73,7 +73,7 @@ class ResidualServo:
         if self.phase != Phase.SEARCH.value and self.phase not in _STAGES:
             gains = self.servo.gains.gaze
             command = _with_lateral(command, residual, self._percept.fixation, self._T_base_cam, gains)
-        return np.array([*command.camera_twist / TWIST_LIMITS, command.gripper], np.float32)
+        return np.array([*command.camera_twist / ROBOT.arm.twist_limits, command.gripper], np.float32)
 
 
 class ResidualEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any], NDArray[np.float32]]):
@@ -115,7 +115,7 @@ def _with_lateral(
     The whole is slowed down to what the camera may do.
     """
     before = command.camera_twist[:2]
-    wanted = before + _SHARE * MAX_LINEAR_SPEED * np.clip(residual, -1.0, 1.0)
+    wanted = before + _SHARE * ROBOT.arm.linear_speed * np.clip(residual, -1.0, 1.0)
     added = np.array([*(gaze.within_reach(wanted, T_base_cam, fixation.point_base, gains) - before), 0.0])
     rotation = servo_laws.gaze_rotation(fixation.centroid, 0.0, 1.0 / fixation.distance_m, added, 0.0)
     return Command(gaze.within_speed(command.camera_twist + np.array([*added, *rotation, 0.0])), command.gripper)

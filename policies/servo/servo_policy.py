@@ -24,7 +24,7 @@ from fixation_gym.perception.zero_flow.obstacle_memory import (
     believed_points,
     remember,
 )
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Command, FloatArray, Observation
 from policies.base import Action, Estimate
 from policies.servo.gains import ServoGains
@@ -140,7 +140,7 @@ class ServoPolicy:
     def _obstacle_term(self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles) -> ObstacleTerm:
         in_camera = transform(inverse(T_base_cam), obstacles.points)
         depth = percept.fixation.distance_m
-        return obstacle_term(in_camera, obstacles.evidence, depth, TOOL_IN_CAMERA[2], self.gains.obstacle_margin)
+        return obstacle_term(in_camera, obstacles.evidence, depth, ROBOT.tool_in_camera[2], self.gains.obstacle_margin)
 
     def _is_close(self, percept: Percept, obstacles: Obstacles) -> bool:
         """Whether something is next to the hand, while it goes around; on its way in, the corridor says more."""

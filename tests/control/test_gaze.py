@@ -8,7 +8,7 @@ from fixation_gym.control import gaze
 from fixation_gym.control.gaze import GazeGains
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.robot import TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 
 GAINS = GazeGains()
 TARGET = np.array([0.55, 0.1, -0.08])
@@ -88,4 +88,4 @@ def test_the_search_turns_at_its_rate_and_moves_nowhere():
 def test_fast_twists_are_slowed_down_as_a_whole():
     twist = np.array([0.3, 0.0, 0.15, 0.0, 0.4, 0.0])
     np.testing.assert_allclose(gaze.within_speed(twist), 0.5 * twist)
-    np.testing.assert_array_equal(gaze.within_speed(0.1 * TWIST_LIMITS), 0.1 * TWIST_LIMITS)
+    np.testing.assert_array_equal(gaze.within_speed(0.1 * ROBOT.arm.twist_limits), 0.1 * ROBOT.arm.twist_limits)

@@ -19,7 +19,7 @@ from fixation_gym.control.open_loop import (
 )
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 
 GAINS = OpenLoopGains(hold_seconds=3.0)
 POINT = np.array([0.55, 0.0, -0.08])
@@ -66,12 +66,12 @@ def test_the_grasp_brings_the_tool_to_the_point_without_turning_and_never_backwa
         assert twist[2] > -1e-9
         np.testing.assert_array_equal(twist[3:], 0.0)
         pose = pose @ exp_twist(twist, 0.04)
-    assert np.linalg.norm(pose[:3, :3] @ TOOL_IN_CAMERA + pose[:3, 3] - POINT) < GAINS.tool_tolerance
+    assert np.linalg.norm(pose[:3, :3] @ ROBOT.tool_in_camera + pose[:3, 3] - POINT) < GAINS.tool_tolerance
 
 
 def tool_of(grasp):
     """Where the tool is at the end of a grasp, in base, shape (3,), m."""
-    return grasp.goal + POSE[:3, :3] @ TOOL_IN_CAMERA
+    return grasp.goal + POSE[:3, :3] @ ROBOT.tool_in_camera
 
 
 def test_fingers_keep_off_the_table():
@@ -89,10 +89,10 @@ def test_a_body_is_grasped_below_its_middle_and_a_surface_where_it_is():
 
 
 def test_the_palm_stays_off_a_body_that_is_deeper_than_the_fingers_are_long():
-    reach = GAINS.finger_length + 0.01
+    reach = ROBOT.hand.finger_length + 0.01
     tool = tool_of(begin_grasp(POSE, Target(POINT, reach, POINT[2] - 0.04), 0.0, GAINS))
     touching = POINT - reach * POSE[:3, 2]
-    assert POSE[:3, 2] @ (tool - touching) == pytest.approx(GAINS.finger_length)
+    assert POSE[:3, 2] @ (tool - touching) == pytest.approx(ROBOT.hand.finger_length)
 
 
 def test_a_grasp_follows_a_pushed_target_and_nothing_less():

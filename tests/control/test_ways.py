@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.control.corridor import level_axes
-from fixation_gym.control.reach import azimuth_range, directions, sample_direction
+from fixation_gym.control.reach import directions, sample_direction
 from fixation_gym.control.ways import (
     SeenSpace,
     WayCosts,
@@ -16,7 +16,7 @@ from fixation_gym.control.ways import (
     way_costs,
 )
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 
 TARGET = np.array([0.55, 0.08, -0.08])
 BEARING = math.atan2(TARGET[1], TARGET[0])
@@ -67,8 +67,8 @@ def test_a_wide_box_is_approached_along_its_sides_or_from_above():
     half_sizes = np.array([0.035, 0.035, 0.035])
     widths = (2.0 * np.abs(axes @ np.vstack([normals, [0.0, 0.0, 1.0]]).T) @ half_sizes).min(axis=1)
     best = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS, widths), None, COSTS)
-    assert widths[ways.nearest(present)] > COSTS.finger_span[1]
-    assert widths[best] < COSTS.finger_span[1]
+    assert widths[ways.nearest(present)] > ROBOT.hand.finger_span[1]
+    assert widths[best] < ROBOT.hand.finger_span[1]
     narrow = chosen_way(way_costs(ways, present, NONE, 60.0, COSTS, 0.8 * widths), None, COSTS)
     assert narrow == chosen_way(way_costs(ways, present, NONE, 60.0, COSTS), None, COSTS)
 
@@ -78,7 +78,7 @@ def test_what_is_deeper_in_a_corridor_counts_more():
     nearest = known_ways(NONE, np.zeros(0), TARGET, everything_seen(), 0.01)
     axes = level_axes(nearest.directions[[nearest.nearest(way)]])[0]
     # The hand is widest at 0.104 m to the side, 0.08 m behind the finger tips.
-    beside = [np.array([x, TOOL_IN_CAMERA[1], -0.2]) @ axes + TARGET for x in (0.090, 0.100, 0.108, 0.120)]
+    beside = [np.array([x, ROBOT.tool_in_camera[1], -0.2]) @ axes + TARGET for x in (0.090, 0.100, 0.108, 0.120)]
     counted = [
         known_ways(point[None], np.array([30.0]), TARGET, everything_seen(), 0.01).evidence[nearest.nearest(way)]
         for point in beside
@@ -146,7 +146,7 @@ def test_the_lateral_direction_leads_to_the_way(way):
 def test_directions_are_drawn_within_the_reach_and_from_all_of_it():
     rng = np.random.default_rng(0)
     for elevation in np.radians([40.0, 63.0, 85.0]):
-        low, high = azimuth_range(elevation)
+        low, high = ROBOT.arm.reach.azimuths(elevation)
         drawn = np.array([sample_direction(rng, elevation, (1.0, 1.0)) for _ in range(200)])
         assert np.all(drawn[:, 1] == elevation)
         azimuths = (drawn[:, 0] - low) / (high - low)

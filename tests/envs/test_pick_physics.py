@@ -7,7 +7,7 @@ import pytest
 from fixation_gym.envs.config import SCENARIO_NAMES
 from fixation_gym.geometry.rigid import pose_to_matrix
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.robot import TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
 
 pytestmark = pytest.mark.sim
@@ -21,7 +21,7 @@ def test_the_camera_follows_a_commanded_circle_within_five_percent(ideal_env):
         phase = 2.0 * k / 25.0
         v = 0.05 * np.array([np.cos(phase), np.sin(phase), 0.0])
         twist = np.array([*v, v[1] / 0.45, -v[0] / 0.45, 0.0])
-        obs, *_ = ideal_env.step(np.array([*twist / TWIST_LIMITS, -1.0], np.float32))
+        obs, *_ = ideal_env.step(np.array([*twist / ROBOT.arm.twist_limits, -1.0], np.float32))
         commanded.append(twist)
         measured.append(obs["camera_twist"])
     error = np.array(measured)[10:] - np.array(commanded)[10:]

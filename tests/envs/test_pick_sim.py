@@ -11,7 +11,7 @@ from fixation_gym.control.computed_torque import arm_torques, camera_kinematics
 from fixation_gym.control.resolved_rate import joint_velocities
 from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.envs.sampling import sample_scene
-from fixation_gym.robot import HAND_EYE
+from fixation_gym.robots import ROBOT
 
 pytestmark = pytest.mark.sim
 
@@ -28,7 +28,7 @@ def sim():
 
 def test_camera_pose_and_jacobian_are_those_of_mujoco(sim):
     model, data = sim.model, sim.data
-    pose, jacobian = camera_kinematics(sim._arm_dynamics, HAND_EYE)
+    pose, jacobian = camera_kinematics(sim._arm_dynamics, ROBOT.camera.hand_eye)
     mujoco.mj_camlight(model, data)
     camera = data.cam("wrist")
     # MuJoCo's cameras look along -z with y up.
@@ -44,7 +44,7 @@ def test_torques_are_those_of_the_dense_mass_matrix(sim):
     model, data, arm = sim.model, sim.data, sim._arm_dynamics
     mujoco.mj_step1(model, data)
     twist, command, torques = np.array([0.05, 0, 0.02, 0, 0.1, 0]), data.qpos[:7] + 0.001, np.zeros(7)
-    _, jacobian = camera_kinematics(arm, HAND_EYE)
+    _, jacobian = camera_kinematics(arm, ROBOT.camera.hand_eye)
     velocity = joint_velocities(jacobian, twist, data.qpos[:7].copy(), sim._posture, sim._limits)
     lead = command + velocity * model.opt.timestep - data.qpos[:7]
     acceleration = computed_torque._VELOCITY_GAIN * (velocity - data.qvel[:7]) + computed_torque._POSITION_GAIN * lead

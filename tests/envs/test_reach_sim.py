@@ -1,4 +1,4 @@
-"""The arm really gets where ``control/reach.py`` says: kinematics with the joint limits of the simulated Panda."""
+"""The arm really gets where ``ROBOT.arm.reach`` says: kinematics with the joint limits of the simulated Panda."""
 
 import math
 
@@ -11,11 +11,10 @@ from fixation_gym.control.gaze import GazeGains
 from fixation_gym.control.reach import REACH_GRID, directions
 from fixation_gym.control.resolved_rate import joint_velocities
 from fixation_gym.control.ways import lateral_direction
-from fixation_gym.envs.contacts import ROBOT
-from fixation_gym.envs.pick_sim import POSTURE, PickSim
-from fixation_gym.envs.scene import TABLE_HEIGHT
+from fixation_gym.envs import contacts
+from fixation_gym.envs.pick_sim import PickSim
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 
 pytestmark = pytest.mark.sim
 PERIOD = 0.04
@@ -30,7 +29,7 @@ def sim():
 def moved(sim, joints, twist):
     """Joint angles after one period at a camera twist."""
     state = arm(sim, joints)
-    speeds = joint_velocities(state.jacobian, twist, joints, POSTURE, sim._limits)
+    speeds = joint_velocities(state.jacobian, twist, joints, sim._posture, sim._limits)
     return np.clip(joints + PERIOD * speeds, sim._limits.lower, sim._limits.upper)
 
 
@@ -57,18 +56,18 @@ def error_at_the_target(sim, target, way):
         v = np.array([*direction * min(2.5 * local[2] * angle, 0.13), forward])
         twist = gaze.fixating_twist(v, local[:2] / local[2], local[2], gaze.levelling(pose, gains), gains)
         joints = moved(sim, joints, twist)
-    goal = target - pose[:3, :3] @ TOOL_IN_CAMERA
+    goal = target - pose[:3, :3] @ ROBOT.tool_in_camera
     for _ in range(80):
         joints = moved(sim, joints, servo_laws.pose_twist(arm(sim, joints).camera_pose, goal, 4.0, 0.1))
     error = float(np.linalg.norm(arm(sim, joints).camera_pose[:3, 3] - goal))
     mujoco.mj_collision(sim.model, sim.data)
-    touching = [pair for pair in sim.data.contact.geom if np.all(owners[pair] == ROBOT)]
+    touching = [pair for pair in sim.data.contact.geom if np.all(owners[pair] == contacts.ROBOT)]
     return math.inf if touching else error
 
 
 @pytest.mark.parametrize("place", [(0.50, 0.0), (0.62, 0.14), (0.55, -0.14)])
 def test_the_tool_gets_to_the_target_from_all_over_the_reach(sim, place):
-    target = np.array([*place, TABLE_HEIGHT + 0.035])
+    target = np.array([*place, ROBOT.workspace.table_height + 0.035])
     ways = directions(REACH_GRID, target)[::4]
     errors = np.array([error_at_the_target(sim, target, way) for way in ways])
     assert np.mean(errors < 0.005) >= 0.9

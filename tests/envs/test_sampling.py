@@ -16,10 +16,10 @@ from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.obstacle_kinds import MATERIALS
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.sampling import sample_scene
-from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.envs.visibility import visible_share
 from fixation_gym.geometry.boxes import box_set, joined
 from fixation_gym.geometry.rigid import look_at
+from fixation_gym.robots import ROBOT
 
 CROWDED = [name for name, scenario in SCENARIOS.items() if scenario.obstacle_materials]
 
@@ -39,7 +39,7 @@ def test_scenes_stand_on_the_table_apart_from_each_other(name):
     for scene in scenes(name):
         target = scene.target
         low = target.position[2] - target_shape(target.shape).half_extent[2] * target.scale[2]
-        assert low == pytest.approx(TABLE_HEIGHT)
+        assert low == pytest.approx(ROBOT.workspace.table_height)
         assert 0.025 <= 2 * target_shape(target.shape).half_extent[1] * target.scale[1] <= 0.07 + 1e-9
         assert max(target.scale) <= 1.0
         assert fits_pool(scene.obstacles)
@@ -49,7 +49,7 @@ def test_scenes_stand_on_the_table_apart_from_each_other(name):
         for index, obstacle in enumerate(scene.obstacles):
             boxes = obstacle.boxes
             lowest = boxes.centres[:, 2] - np.einsum("nj,nj->n", np.abs(boxes.rotations[:, 2]), boxes.halves)
-            assert lowest.min() == pytest.approx(TABLE_HEIGHT, abs=1e-9)
+            assert lowest.min() == pytest.approx(ROBOT.workspace.table_height, abs=1e-9)
             assert not boxes_meet(boxes, box_set([target.box]), 0.01)
             others = [other.boxes for other in scene.obstacles[:index]]
             assert not others or not boxes_meet(boxes, joined(others), 0.005)

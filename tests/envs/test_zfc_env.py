@@ -12,10 +12,10 @@ from gymnasium.utils.env_checker import check_env
 
 import fixation_gym  # noqa: F401
 from fixation_gym.envs.pick_env import FixationPickEnv
-from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.envs.zfc_env import FixationPickZFC, make_zfc_env
 from fixation_gym.envs.zfc_observation import OBSERVATIONS
 from fixation_gym.perception.pipeline import Perception
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
 
 pytestmark = pytest.mark.sim
@@ -130,7 +130,7 @@ def test_bad_arguments_are_refused_before_anything_is_built(arguments, message):
 
 def test_map_and_fixation_are_what_perception_says_of_the_same_frames(base):
     env = FixationPickZFC(base)
-    perception = Perception(base.intrinsics, support_height_m=TABLE_HEIGHT)
+    perception = Perception(base.intrinsics, support_height_m=ROBOT.workspace.table_height)
     obs, _ = env.reset(seed=1)
     known = 0
     for step in range(15):

@@ -18,7 +18,7 @@ from evaluation_fakes import FakeEnv, FakePolicy
 
 from fixation_gym import cli, report_commands
 from fixation_gym.control.corridor import free_directions
-from fixation_gym.control.reach import HIGHEST, LOWEST, REACH_GRID, azimuth_range, reachable_directions
+from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.errors import UsageError
@@ -38,9 +38,11 @@ from fixation_gym.experiments.necessity.run import (
 from fixation_gym.experiments.necessity.statistics import chosen_ways, format_table, summarise
 from fixation_gym.experiments.necessity.ways import ELEVATIONS, QUICK_WAYS, STRAIGHT, WAYS, azimuth_cells
 from fixation_gym.geometry.boxes import joined
+from fixation_gym.robots import ROBOT
 from policies import catalogue
 from policies.blind_ways import BlindWay
 
+REACH = ROBOT.arm.reach
 SCENES = 12
 """Scenes per scenario of the geometric test."""
 MOST_OPEN, MOST_OPEN_IN_ALL = 0.75, 0.40
@@ -69,16 +71,16 @@ def test_the_family_has_many_different_ways_of_every_style_and_speed():
 def test_all_ways_are_within_reach(first_view):
     bearing = math.radians(-10.0)
     for way in WAYS.values():
-        low, high = azimuth_range(math.radians(way.elevation_deg))
+        low, high = REACH.azimuths(math.radians(way.elevation_deg))
         azimuths = way.azimuths(bearing, first_view) - bearing
         assert np.all((low - 1e-9 <= azimuths) & (azimuths <= high + 1e-9)), way.name
         for depth, seconds in ((math.inf, 0.0), (0.3, 1.0), (0.18, 5.0)):
-            assert LOWEST - 1e-9 <= way.elevation(depth, seconds) <= HIGHEST + 1e-9, way.name
+            assert REACH.lowest - 1e-9 <= way.elevation(depth, seconds) <= REACH.highest + 1e-9, way.name
 
 
 def test_straight_ways_are_nowhere_far_apart():
     for elevation in ELEVATIONS:
-        low, high = (math.degrees(angle) for angle in azimuth_range(math.radians(elevation)))
+        low, high = (math.degrees(angle) for angle in REACH.azimuths(math.radians(elevation)))
         cells = azimuth_cells(elevation)
         assert cells[0][0] == pytest.approx(low)
         assert cells[-1][1] == pytest.approx(high)
@@ -102,7 +104,7 @@ def test_styles_differ_in_how_they_come_in():
 
 def test_a_way_from_the_first_view_ends_where_the_reach_does():
     way = BlindWay(42, 50, origin="view")
-    high = azimuth_range(math.radians(42.0))[1]
+    high = REACH.azimuths(math.radians(42.0))[1]
     assert way.azimuths(0.1, 0.1 + math.radians(20.0))[0] == pytest.approx(0.1 + math.radians(70.0))
     assert way.azimuths(0.1, 0.1 + math.radians(60.0))[0] == pytest.approx(0.1 + high)
 

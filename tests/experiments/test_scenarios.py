@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fixation_gym import cli
-from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
+from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.errors import UsageError
 from fixation_gym.experiments.scenarios.rules import RULES, plane_front
 from fixation_gym.experiments.scenarios.run import CSV_FILE, RUNS_FILE, ScenariosConfig, cell_key, instance_rng, measure
@@ -28,6 +28,7 @@ from fixation_gym.experiments.scenarios.view import MARGIN, SceneView
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, look_at, transform
 from fixation_gym.perception.zero_flow.region_vote import VoteSettings
+from fixation_gym.robots import ROBOT
 
 
 def view_of(instance: Instance) -> SceneView:
@@ -76,12 +77,12 @@ def test_what_holds_the_target_up_reaches_from_the_table_to_it():
         target = instance.scene.target.box
         low = target.centre[2] - target.half_extent[2]
         if instance.stand is None:
-            assert low == pytest.approx(TABLE_HEIGHT)
+            assert low == pytest.approx(ROBOT.workspace.table_height)
             continue
         stand = instance.scene.obstacles[instance.stand]
-        assert stand.position[2] - stand.shape.half_extent[2] == pytest.approx(TABLE_HEIGHT)
+        assert stand.position[2] - stand.shape.half_extent[2] == pytest.approx(ROBOT.workspace.table_height)
         assert stand.position[2] + stand.shape.half_extent[2] == pytest.approx(low)
-        assert 0.05 <= low - TABLE_HEIGHT <= 0.15
+        assert 0.05 <= low - ROBOT.workspace.table_height <= 0.15
 
 
 def test_the_plane_is_in_front_where_the_table_is_nearer_than_the_target():

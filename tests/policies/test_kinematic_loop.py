@@ -7,12 +7,12 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at, matrix_to_pose
 from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.robot import CAMERA_FOVY, TOOL_IN_CAMERA, TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
 from policies.servo.gains import ServoGains
 from policies.servo.servo_policy import ServoPolicy
 
-INTRINSICS = Intrinsics.from_fovy(120, 160, CAMERA_FOVY)
+INTRINSICS = Intrinsics.from_fovy(120, 160, ROBOT.camera.fovy)
 TARGET = np.array([0.55, 0.0, 0.0])
 RADIUS = 0.025
 UP = np.array([0.0, 0.0, 1.0])
@@ -77,14 +77,14 @@ def test_the_distance_is_known_within_two_percent_before_the_approach(pick):
 
 def test_the_tool_ends_at_the_target(pick):
     T_base_cam = next(pose for _, estimate, pose, _ in pick if estimate.phase == "close")
-    tool = T_base_cam[:3, :3] @ TOOL_IN_CAMERA + T_base_cam[:3, 3]
+    tool = T_base_cam[:3, :3] @ ROBOT.tool_in_camera + T_base_cam[:3, 3]
     assert np.linalg.norm(tool - TARGET) < 0.012
 
 
 def test_commands_stay_within_the_limits_and_use_them(pick):
     twists = np.abs([twist for *_, twist in pick])
-    assert np.all(twists <= TWIST_LIMITS * (1 + 1e-9))
-    assert np.all(twists.max(axis=0)[:5] > 0.1 * TWIST_LIMITS[:5])
+    assert np.all(twists <= ROBOT.arm.twist_limits * (1 + 1e-9))
+    assert np.all(twists.max(axis=0)[:5] > 0.1 * ROBOT.arm.twist_limits[:5])
 
 
 def test_a_lost_target_is_recovered():

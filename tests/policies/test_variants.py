@@ -12,7 +12,7 @@ from test_kinematic_loop import INTRINSICS, START, TARGET, run
 from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 from policies.catalogue import POLICY_NAMES, make_policy
 from policies.servo.servo_policy import ServoPolicy
 from policies.servo.variants import VARIANT_NAMES, VARIANTS, servo_variant
@@ -44,7 +44,7 @@ def test_without_poses_the_fixation_constraint_leads_the_hand_to_the_target() ->
     true = T_base_cam[:3, 2] @ (TARGET - T_base_cam[:3, 3])
     assert estimate.distance_m == pytest.approx(true, rel=0.1)
     T_base_cam = next(pose for _, estimate, pose, _ in trail if estimate.phase == "close")
-    tool = T_base_cam[:3, :3] @ TOOL_IN_CAMERA + T_base_cam[:3, 3]
+    tool = T_base_cam[:3, :3] @ ROBOT.tool_in_camera + T_base_cam[:3, 3]
     assert np.linalg.norm(tool - TARGET) < 0.02
 
 

@@ -13,13 +13,12 @@ import numpy as np
 
 import fixation_gym  # noqa: F401 - registers the environments
 from fixation_gym.envs.config import CONTROL_FREQUENCY
-from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.envs.zfc_observation import OBSERVATIONS
 from fixation_gym.experiments.bench.groups import Case
 from fixation_gym.experiments.bench.stages import stages
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
 from policies.servo.servo_policy import ServoPolicy
 
@@ -77,9 +76,7 @@ def perception_cases() -> Iterator[Case]:
     for size in PERCEPTION_SIZES:
         recorded = record_approach(size)
         observations = [Observation.from_dict(observation) for observation in recorded]
-        yield Case(
-            f"perception {label(size)}", _replay(Perception(_camera(size), support_height_m=TABLE_HEIGHT), observations)
-        )
+        yield Case(f"perception {label(size)}", _replay(_perception(size), observations))
         for name, run in stages(_camera(size), observations):
             yield Case(f"{name} {label(size)}", run)
         yield Case(f"ServoPolicy.act {label(size)}", _act(size, recorded))
@@ -93,7 +90,7 @@ def record_approach(size: Size) -> list[dict[str, Any]]:
     """Observations of the environment in the servo's first second of one ``opaque`` scene."""
     env = gym.make("FixationPick-v0", scenario="opaque", image_size=size)
     observation, _ = env.reset(seed=0)
-    policy = ServoPolicy(Perception(_camera(size), support_height_m=TABLE_HEIGHT))
+    policy = ServoPolicy(_perception(size))
     policy.reset(0)
     recorded = []
     for _ in range(_FRAMES):
@@ -202,7 +199,7 @@ def _replay(perception: Perception, observations: list[Observation]) -> Callable
 
 
 def _act(size: Size, recorded: list[dict[str, Any]]) -> Callable[[], Any]:
-    policy = ServoPolicy(Perception(_camera(size), support_height_m=TABLE_HEIGHT))
+    policy = ServoPolicy(_perception(size))
     index = 0
 
     def run() -> None:
@@ -232,4 +229,8 @@ def _farneback(first: Any, second: Any) -> Any:
 
 
 def _camera(size: Size) -> Intrinsics:
-    return Intrinsics.from_fovy(*size, CAMERA_FOVY)
+    return Intrinsics.from_fovy(*size, ROBOT.camera.fovy)
+
+
+def _perception(size: Size) -> Perception:
+    return Perception(_camera(size), support_height_m=ROBOT.workspace.table_height)

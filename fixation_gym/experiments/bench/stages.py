@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix
 from fixation_gym.geometry.twist import mean_twist
@@ -20,6 +19,7 @@ from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.scratch import Scratch
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.zero_flow import Gaze, zero_flow_test
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray, Observation
 
 _SETTINGS = PerceptionSettings()
@@ -67,7 +67,7 @@ def stages(camera: Intrinsics, observations: Sequence[Observation]) -> Iterator[
         twist = mean_twist(moment.poses[0], moment.poses[2], moment.times[2] - moment.times[0])
         mask = moment.percept.segmentation.mask
         gaze = Gaze(twist, moment.inverse_distance, 0.05, mask, moment.poses[1])
-        return zero_flow_test(moment.percept.flow, gaze, _SETTINGS.zero_flow, None, TABLE_HEIGHT)
+        return zero_flow_test(moment.percept.flow, gaze, _SETTINGS.zero_flow, None, ROBOT.workspace.table_height)
 
     def follow(index: int) -> Any:
         moment = moments[index]
@@ -90,7 +90,7 @@ def stages(camera: Intrinsics, observations: Sequence[Observation]) -> Iterator[
 
 def _moments(camera: Intrinsics, observations: Sequence[Observation]) -> list[_Moment]:
     """Every three successive observations in which the target is seen."""
-    perception = Perception(camera, support_height_m=TABLE_HEIGHT)
+    perception = Perception(camera, support_height_m=ROBOT.workspace.table_height)
     percepts = [perception.update(observation) for observation in observations]
     return [
         _Moment(

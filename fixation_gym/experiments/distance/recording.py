@@ -36,7 +36,7 @@ from fixation_gym.perception.distance.calibrating_filter import CalibratingSetti
 from fixation_gym.perception.distance.flat_target import coverage, flat_centroid
 from fixation_gym.perception.distance.flow_filters import FlowSamples
 from fixation_gym.perception.distance.flow_samples import CutOut, FlowName, sample_flow
-from fixation_gym.robot import TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
 
 _GAZE_GAIN, _POSITION_GAIN, _TURN_GAIN = 4.0, 2.0, 2.0
@@ -127,7 +127,7 @@ class _Sensors:
             first, middle, last = self._cut_outs
             flow = sample_flow((first, middle, last), INTRINSICS, inverse_distance, rng)
         target = self._rig.print_position
-        exact = sensors.measure_camera_pose(arm.camera_pose, arm.jacobian, np.zeros(7), hand_eye)
+        exact = sensors.measure_camera_pose(arm.camera_pose, arm.jacobian, np.zeros_like(error), hand_eye)
         in_lens = arm.camera_pose[:3, :3].T @ (target - arm.camera_pose[:3, 3])
         gaze_error = INTRINSICS.project(in_lens) - [INTRINSICS.cx, INTRINSICS.cy]
         return Frame(
@@ -213,8 +213,8 @@ def _command(motion: Motion, circle: Circle, frame: Frame, distance: float, firs
     v = pose[:3, :3].T @ (velocity + _POSITION_GAIN * (position - pose[:3, 3]))
     if motion == "translation":
         turn = Rotation.from_matrix(pose[:3, :3].T @ first.sighting.T_base_cam[:3, :3]).as_rotvec()
-        return np.clip(np.concatenate([v, _TURN_GAIN * turn]), -TWIST_LIMITS, TWIST_LIMITS)
+        return np.clip(np.concatenate([v, _TURN_GAIN * turn]), -ROBOT.arm.twist_limits, ROBOT.arm.twist_limits)
     roll = _TURN_GAIN * float(np.clip(pose[2, 0], -0.5, 0.5))  # x axis back to the horizontal
     centroid = np.zeros(2) if frame.sighting.centroid is None else frame.sighting.centroid
     w = gaze_rotation(centroid, _GAZE_GAIN, 1.0 / distance, v, roll)
-    return np.clip(np.array([*v, *w, roll]), -TWIST_LIMITS, TWIST_LIMITS)
+    return np.clip(np.array([*v, *w, roll]), -ROBOT.arm.twist_limits, ROBOT.arm.twist_limits)

@@ -17,11 +17,10 @@ from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import SceneSpec, TargetSpec
 from fixation_gym.experiments.distance.duck_print import CARD_PER_WIDTH, TEXTURE_SIZE, card_image
 from fixation_gym.experiments.distance.sequence import HOME, IMAGE_SIZE
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
 
 CONTROL_FREQUENCY = 25
-POSTURE = np.array([0.0, -1.0, 0.0, -2.4, 0.0, 2.97, 0.785])
-"""Joint angles, rad, with the camera looking straight ahead, far from joint limits and singular postures."""
 _BACKDROP_X, _TILES, _TILE = 10.0, 9, "backdrop_"
 _THICKNESS = 0.0005
 
@@ -57,7 +56,7 @@ class PrintRig:
 
     def __init__(self) -> None:
         """Compile the model and paint the print."""
-        self._sim = PickSim(CONTROL_FREQUENCY, _add_print, POSTURE)
+        self._sim = PickSim(CONTROL_FREQUENCY, _add_print, ROBOT.arm.posture_ahead)
         model = self._sim.model
         self.dt = 1.0 / CONTROL_FREQUENCY
         self._geom = model.geom("print").id

@@ -10,15 +10,16 @@ import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 Motion = Literal["fixation", "translation"]
 
 IMAGE_SIZE = (480, 640)
 """Height and width of the wrist image, px."""
-INTRINSICS = Intrinsics.from_fovy(*IMAGE_SIZE, CAMERA_FOVY)
-HOME = look_at(np.array([0.295, 0.0, 0.87]), np.array([1.295, 0.0, 0.87]), np.array([0.0, 0.0, 1.0]))
+INTRINSICS = Intrinsics.from_fovy(*IMAGE_SIZE, ROBOT.camera.fovy)
+_EYE = np.array(ROBOT.arm.camera_ahead)
+HOME = look_at(_EYE, np.add(_EYE, (1.0, 0.0, 0.0)), np.array([0.0, 0.0, 1.0]))
 """T_base_home, shape (4, 4): the camera in the middle of its circle; the print faces it."""
 HOME.setflags(write=False)
 CENTROID_STD_PX = 0.02

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fixation_gym.control.reach import azimuth_range
+from fixation_gym.robots import ROBOT
 from policies.blind_ways import BlindWay
 
 ELEVATIONS = (42, 48, 55, 62, 70, 80, 85)
@@ -26,7 +26,7 @@ def azimuth_cells(elevation_deg: float, spacing_deg: float = _SPACING) -> list[t
 
     A part is about ``spacing_deg`` wide as seen from the target.
     """
-    low, high = (math.degrees(angle) for angle in azimuth_range(math.radians(elevation_deg)))
+    low, high = (math.degrees(angle) for angle in ROBOT.arm.reach.azimuths(math.radians(elevation_deg)))
     count = max(2, round((high - low) * math.cos(math.radians(elevation_deg)) / spacing_deg))
     step = (high - low) / count
     return [(low + index * step, low + (index + 1) * step) for index in range(count)]

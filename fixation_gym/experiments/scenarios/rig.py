@@ -13,17 +13,17 @@ from fixation_gym.envs import sensors
 from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE, SensorNoise
 from fixation_gym.envs.pick_sim import PickSim
 from fixation_gym.envs.rendering import View
-from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
+from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.envs.scene_mjcf import CAMERA_NAME, HIDDEN_GROUP, obstacle_part_name
 from fixation_gym.envs.truth_view import Truth, TruthView
 from fixation_gym.experiments.scenarios.scenes import Instance, sample_instance
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose, pose_to_matrix
 from fixation_gym.perception import Percept, Perception, segment
-from fixation_gym.robot import CAMERA_FOVY, TWIST_LIMITS
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray, Observation
 
-INTRINSICS = Intrinsics.from_fovy(*IMAGE_SIZE, CAMERA_FOVY)
+INTRINSICS = Intrinsics.from_fovy(*IMAGE_SIZE, ROBOT.camera.fovy)
 _GAZE_GAIN, _ROLL_GAIN = 4.0, 1.5
 """1/s."""
 _LEAST_AREA = 0.001
@@ -58,7 +58,7 @@ class ScenarioRig:
         self._noise = noise
         self.sim = PickSim(CONTROL_FREQUENCY)
         self._view = View(self.sim.model, CAMERA_NAME, *IMAGE_SIZE, full_quality=False)
-        self.perception = Perception(INTRINSICS, support_height_m=TABLE_HEIGHT)
+        self.perception = Perception(INTRINSICS, support_height_m=ROBOT.workspace.table_height)
         self._truth = TruthView(self.sim.model, self.perception.flow_intrinsics)
         self.owners = tuple(self.sim.model.body(body).name for body in self.sim.model.geom_bodyid)
         """Name of the body of every geom."""
@@ -176,4 +176,4 @@ def _command(instance: Instance, time: float, percept: Percept, observation: Obs
     fixation, T_base_cam = percept.fixation, pose_to_matrix(observation.camera_pose)
     roll = roll_rate(math.atan2(T_base_cam[2, 0], -T_base_cam[2, 1]), _ROLL_GAIN)
     w = gaze_rotation(fixation.centroid, _GAZE_GAIN, 1.0 / fixation.distance_m, v, roll)
-    return np.clip(np.array([*v, *w, roll]), -TWIST_LIMITS, TWIST_LIMITS)
+    return np.clip(np.array([*v, *w, roll]), -ROBOT.arm.twist_limits, ROBOT.arm.twist_limits)

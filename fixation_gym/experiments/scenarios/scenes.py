@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec, SceneSpec
+from fixation_gym.envs.scene import ObstacleSpec, SceneSpec
 from fixation_gym.experiments.scenarios.forms import stand_shape
 from fixation_gym.experiments.scenarios.things import (
     PLAIN_TEXTURE,
@@ -28,6 +28,7 @@ from fixation_gym.experiments.scenarios.things import (
 from fixation_gym.experiments.scenarios.view import MARGIN, SceneView, sample_view
 from fixation_gym.experiments.scenarios.wishes import WISHES
 from fixation_gym.geometry.boxes import BoxSet, box_set
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 SCENES = ("opaque", "see_through", "mirror", "reflection")
@@ -201,7 +202,7 @@ def _stand(view: SceneView, variant: str, rng: np.random.Generator) -> list[Obst
     x, y, _ = view.target.position
     texture = PLAIN_TEXTURE if variant == "plain" else str(rng.choice(TEXTURES))
     shape = stand_shape(float(rng.uniform(0.035, 0.05)), view.rise)
-    place = (x, y, TABLE_HEIGHT + 0.5 * view.rise)
+    place = (x, y, ROBOT.workspace.table_height + 0.5 * view.rise)
     return [ObstacleSpec("opaque", shape, place, view.target.yaw, (1.0, 1.0, 1.0, 1.0), texture)]
 
 

@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from fixation_gym.envs.scene import TABLE_HEIGHT
 from fixation_gym.envs.truth_view import Truth
 from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
 from fixation_gym.experiments.scenarios.rules import Rule, plane_front
 from fixation_gym.experiments.scenarios.scenes import Instance
 from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front
 from fixation_gym.perception.zero_flow.region_vote import VoteSettings, region_votes
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
 PLACES = ("obstacle", "table", "room")
@@ -101,10 +101,11 @@ def _edges(depth: FloatArray) -> MaskArray:
 def calls(look: Look) -> dict[Rule, MaskArray]:
     """Pixels that each rule calls nearer, shape (h, w); only those that are ``supported`` count."""
     percept, zfc = look.percept, look.percept.zfc
+    table = ROBOT.workspace.table_height
     with np.errstate(invalid="ignore"):
         exact = zfc.inverse_depth > zfc.fixated_inverse_depth
     return {
-        "plane": plane_front(percept.T_base_flow, percept.flow.intrinsics, TABLE_HEIGHT, zfc.fixated_inverse_depth),
+        "plane": plane_front(percept.T_base_flow, percept.flow.intrinsics, table, zfc.fixated_inverse_depth),
         "behind": np.zeros_like(exact),
         "paper": dot_product_front(percept.flow, look.twist),
         "exact": exact,

@@ -25,7 +25,7 @@ from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
 from fixation_gym.perception.zero_flow.region_vote import Side, VoteSettings, decide
 from fixation_gym.perception.zero_flow.zero_flow import UNKNOWN
-from fixation_gym.robot import TOOL_IN_CAMERA
+from fixation_gym.robots import ROBOT
 from policies.servo.gains import ServoGains
 
 SETTLED_S = 0.6
@@ -158,7 +158,7 @@ def run_clear(rig: ScenarioRig, variant: str, rng: np.random.Generator) -> dict[
         points, evidence = believed_points(memory, settings)
         to_camera = inverse(percept.T_base_flow)
         in_camera, depth = transform(to_camera, points), float(transform(to_camera, percept.fixation.point_base)[2])
-        term = obstacle_term(in_camera, evidence, depth, TOOL_IN_CAMERA[2], gains.obstacle_margin)
+        term = obstacle_term(in_camera, evidence, depth, ROBOT.tool_in_camera[2], gains.obstacle_margin)
         now = {"map": bool((cells > _FRONT_CELL).any()), "path": term.evidence > gains.obstacle_evidence}
         alarms.update(name for name in now if now[name] and not before[name])
         before = now

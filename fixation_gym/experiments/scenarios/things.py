@@ -15,11 +15,12 @@ from typing import Literal
 import numpy as np
 
 from fixation_gym.control.corridor import boxes_meet
-from fixation_gym.envs.scene import TABLE_HEIGHT, ObstacleSpec
+from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.envs.shapes import Shape, Vector
 from fixation_gym.experiments.scenarios.forms import draw_thing, hung, raised, turned
 from fixation_gym.experiments.scenarios.view import SceneView, Sight
 from fixation_gym.geometry.boxes import BoxSet
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 Form = Literal["standing", "raised", "hung"]
@@ -107,7 +108,7 @@ def draw(view: SceneView, wish: Wish, rng: np.random.Generator) -> ObstacleSpec 
     x = float(rng.uniform(*wish.columns))
     depth = view.depth * float(rng.uniform(*(wish.nearness or (_FRONT if wish.in_front else _BEHIND))))
     half = shape.half_extent[2]
-    lift = 0.0 if wish.row is None else float(view.point(0.0, wish.row, depth)[2]) - TABLE_HEIGHT - half
+    lift = 0.0 if wish.row is None else float(view.point(0.0, wish.row, depth)[2]) - ROBOT.workspace.table_height - half
     if lift < -_ON_TABLE:
         return None
     form = _form(lift, rng)
@@ -191,7 +192,7 @@ def has_room(view: SceneView, obstacle: ObstacleSpec, others: list[BoxSet]) -> b
     """Whether a thing is on the table and keeps clear of the others and of the hand."""
     boxes = obstacle.boxes
     lower_edges = boxes.centres[:, 2] - np.einsum("nj,nj->n", np.abs(boxes.rotations[:, 2]), boxes.halves)
-    low = boxes.centres[lower_edges < TABLE_HEIGHT + _LOW]
+    low = boxes.centres[lower_edges < ROBOT.workspace.table_height + _LOW]
     on_table = np.all((low[:, 0] > 0.18) & (low[:, 0] < 0.94)) and np.all(np.abs(low[:, 1]) < 0.38)
     if not on_table or any(boxes_meet(boxes, other, _GAP) for other in others):
         return False

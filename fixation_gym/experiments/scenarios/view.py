@@ -9,19 +9,19 @@ import numpy as np
 
 from fixation_gym.control.corridor import approach_directions, boxes_meet, hand_boxes
 from fixation_gym.envs.object_pool import target_shape
-from fixation_gym.envs.scene import TABLE_HEIGHT, TARGET_REGION, ObstacleSpec, TargetSpec
+from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
 from fixation_gym.experiments.scenarios.rules import plane_front
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
-from fixation_gym.robot import CAMERA_FOVY
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
 MARGIN = 0.12
 """What is clearly nearer or farther than the target differs by this share of its depth."""
 _HAND_GAP = 0.04
 """Between things and the hand, m: it circles."""
-_EYES = Intrinsics.from_fovy(27, 36, CAMERA_FOVY)
+_EYES = Intrinsics.from_fovy(27, 36, ROBOT.camera.fovy)
 """Lines of sight along which things are looked for; as many pixels as that are enough to tell shares."""
 _RAYS = np.stack([*_EYES.grid, np.ones((_EYES.height, _EYES.width))], axis=-1).reshape(-1, 3)
 
@@ -72,13 +72,13 @@ class SceneView:
         The camera is level, so the column does not matter.
         """
         rotation, eye = self.T_base_cam[:3, :3], self.T_base_cam[:3, 3]
-        return float(((TABLE_HEIGHT + height - eye[2]) / depth - rotation[2, 2]) / rotation[2, 1])
+        return float(((ROBOT.workspace.table_height + height - eye[2]) / depth - rotation[2, 2]) / rotation[2, 1])
 
     def sight(self, obstacle: ObstacleSpec) -> Sight:
         """What is seen of an obstacle, by lines of sight through the boxes around its parts."""
         depths = self._meet(_RAYS, obstacle.boxes)
         hit = np.isfinite(depths)
-        low = plane_front(self.T_base_cam, _EYES, TABLE_HEIGHT, 1.0 / self.depth).ravel()[hit]
+        low = plane_front(self.T_base_cam, _EYES, ROBOT.workspace.table_height, 1.0 / self.depth).ravel()[hit]
         return Sight(depths[hit] / self.depth, _RAYS[hit, :2], hit, float(low.mean()) if low.size else 0.0)
 
     def is_across(self, obstacle: ObstacleSpec) -> bool:
@@ -113,8 +113,8 @@ def sample_view(rng: np.random.Generator, rise: float, forward: float) -> SceneV
     """Draw target and camera; ``rise`` and ``forward`` as in ``SceneView``."""
     shape = target_shape(str(rng.choice(("box", "cylinder", "ball", "ring", "duck"))))
     scale = float(rng.uniform(0.6, 1.0))
-    x, y = (float(rng.uniform(*bounds)) for bounds in TARGET_REGION)
-    position = (x, y, TABLE_HEIGHT + rise + shape.half_extent[2] * scale)
+    x, y = (float(rng.uniform(*bounds)) for bounds in ROBOT.workspace.targets)
+    position = (x, y, ROBOT.workspace.table_height + rise + shape.half_extent[2] * scale)
     target = TargetSpec(shape.name, (scale, scale, scale), position, float(rng.uniform(-math.pi, math.pi)))
     azimuth = math.atan2(y, x) + math.radians(rng.uniform(25.0, 60.0))
     elevation = math.radians(rng.uniform(32.0, 45.0))
