@@ -50,10 +50,7 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
     Raises:
         MissingGLError: if nothing can render here.
     """
-    from fixation_gym.gl import select_backend
-
-    select_backend()  # before the environment's module imports robosuite
-    _limit_opencv_threads()
+    prepare_process()  # before the environment's module imports robosuite
     from policies.catalogue import surroundings
 
     return gymnasium.make(
@@ -168,7 +165,15 @@ def _results(values: Any) -> Iterable[dict[str, Any]]:
     return cast("Iterable[dict[str, Any]]", values)  # joblib's types allow None, which run never returns
 
 
-def _limit_opencv_threads() -> None:
+def prepare_process() -> None:
+    """Choose a GL library and one thread for OpenCV, before anything is rendered in this process.
+
+    Raises:
+        MissingGLError: if nothing can render here.
+    """
+    from fixation_gym.gl import select_backend
+
+    select_backend()
     import cv2
 
     cv2.setNumThreads(1)  # images are small: threads cost more than they gain

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import atexit
-import os
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
-from fixation_gym.doctor import installed_versions
-from fixation_gym.errors import UsageError, check_names
-from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK
-from fixation_gym.evaluation.files import write_csv, write_json
-from fixation_gym.evaluation.missing_cells import run_missing
-from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders
+from fixation_gym.evaluation.files import write_csv
+from fixation_gym.evaluation.workers import prepare_process
 from fixation_gym.experiments.distance.duck_print import valid_widths
 from fixation_gym.experiments.distance.sequence import INTRINSICS, Condition, Motion
 from fixation_gym.experiments.distance.statistics import summarise
-
-if TYPE_CHECKING:
-    from fixation_gym.experiments.distance.rig import PrintRig
+from fixation_gym.experiments.runner import Cell, Experiment, check_options, kept_rig
 
 DISTANCES = (0.066, 0.097, 0.15, 0.21, 0.31, 0.45, 0.66, 0.97, 1.4, 2.0, 3.1, 4.5, 6.6)
 """m, evenly spaced in the logarithm but for the paper's 0.15 and 2."""
@@ -35,7 +26,6 @@ LARGE_AMPLITUDE_FROM = 0.15
 """Nearest distance for the larger circle, m."""
 SEQUENCES_FILE, CSV_FILE, FIGURE_FILE = "sequences.jsonl", "rows.csv", "distance.png"
 
-Cell = dict[str, Any]
 Key = tuple[float, float, str, int]
 """(distance, amplitude, motion, seed)"""
 
@@ -58,29 +48,12 @@ class DistanceConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SENSOR_NOISE
-
-        check_names([self.noise], SENSOR_NOISE, "sensor noise")
-        if self.seed < 0:
-            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
-        if not 1 <= self.seed_count <= SEED_BLOCK:
-            raise UsageError(f"--seeds must be within 1..{SEED_BLOCK}, got {self.seeds}")
-        workers.check_backend("loky", self.workers)
+        check_options(self.noise, self.seed, self.seed_count, "--seeds", self.workers)
 
     @property
     def seed_count(self) -> int:
         """Sequences per distance, amplitude and motion."""
         return self.seeds if self.seeds is not None else 2 if self.quick else 20
-
-    def run_description(self) -> dict[str, Any]:
-        """Everything the result of one sequence depends on, apart from its key."""
-        return {
-            "command": "distance",
-            "seed": self.seed,
-            "noise": self.noise,
-            "gl": os.environ.get("MUJOCO_GL"),
-            "versions": installed_versions(),
-        }
 
     def cells(self) -> list[Cell]:
         """All sequences. A seed's conditions come before those of the next, so that part of a run shows the whole."""
@@ -111,31 +84,32 @@ def cell_key(cell: Cell) -> Key:
     return cell["distance_m"], cell["amplitude_m"], cell["motion"], cell["seed"]
 
 
-_rigs: list[PrintRig] = []  # at most one: it is large
+EXPERIMENT = Experiment(
+    command="distance",
+    unit="sequence",
+    file=SEQUENCES_FILE,
+    outputs=(CSV_FILE, FIGURE_FILE),
+    key=cell_key,
+    content=frozenset({"distance_m", "amplitude_m", "motion", "seed", "results"}),
+    note=lambda value: f"{value['distance_m']:g} m, {value['motion']}",
+)
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
     """Record the sequence of a cell and run every estimator on it; returns the cell with ``results`` and ``bounds``."""
-    from fixation_gym.gl import select_backend
-
-    select_backend()
-    import cv2
-
+    prepare_process()
     from fixation_gym.envs.config import SENSOR_NOISE
     from fixation_gym.experiments.distance.estimates import assess, bounds, estimators, run
     from fixation_gym.experiments.distance.recording import record
     from fixation_gym.experiments.distance.rig import PrintRig
     from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX
 
-    cv2.setNumThreads(1)  # images are small: threads cost more than they gain
-    if not _rigs:
-        _rigs.append(PrintRig())
     condition = Condition(**{name: value for name, value in cell.items() if name != "noise"})
     noise = SENSOR_NOISE[cell["noise"]]
     motion = get_args(Motion).index(condition.motion)
     lengths = round(condition.distance_m * 1e4), round(condition.amplitude_m * 1e4)
     rng = np.random.default_rng([condition.seed, *lengths, motion])
-    recording = record(_rigs[0], condition, noise, rng)
+    recording = record(kept_rig(PrintRig), condition, noise, rng)
     results = [
         assess(recording, estimator, run(recording, estimator, noise)) for estimator in estimators(cell["motion"])
     ]
@@ -159,13 +133,6 @@ def _without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-@atexit.register
-def close_rigs() -> None:
-    """Close the rig that ``run_cell`` keeps alive in this process."""
-    while _rigs:
-        _rigs.pop().close()
-
-
 def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
     """Run the sequences that a folder does not have yet, and write summary, CSV and figure.
 
@@ -182,43 +149,11 @@ def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, A
     """
     from fixation_gym.experiments.distance.figure import draw_figure
 
-    started = time.monotonic()
-    cells = config.cells()
-    store: ResultStore[Key, dict[str, Any]] = ResultStore(
-        out, config.run_description(), SEQUENCES_FILE, key=cell_key, from_json=_checked, to_json=dict
-    )
-    with store:
-        check_no_folders(out, (CSV_FILE, FIGURE_FILE))
-        resumed = run_missing(
-            store,
-            {cell_key(cell): cell for cell in cells},
-            run,
-            parse=dict,
-            note=lambda value: f"{value['distance_m']:g} m, {value['motion']}",
-            unit="sequence",
-            processes=config.workers,
-        )
-        close_rigs()
-        summary = {
-            **summarise([store.finished[cell_key(cell)] for cell in cells], config.noise),
-            **config.run_description(),
-            "quick": config.quick,
-            "seeds": config.seed_count,
-            "sequences_resumed": resumed,
-            "wall_s": time.monotonic() - started,
-        }
-        write_json(out / SUMMARY_FILE, summary)
+    settings = {"seed": config.seed, "noise": config.noise}
+    with EXPERIMENT.opened(out, settings, run, config.workers) as folder:
+        statistics = summarise(folder.results(config.cells()), config.noise)
+        about = {"quick": config.quick, "seeds": config.seed_count, "sequences_resumed": folder.resumed}
+        summary = folder.write_summary(statistics, about)
         write_csv(out / CSV_FILE, summary["rows"])
         draw_figure(out / FIGURE_FILE, summary["rows"])
     return summary
-
-
-def _checked(value: Any) -> dict[str, Any]:
-    """A stored sequence.
-
-    Raises:
-        ValueError: if something of it is missing.
-    """
-    if not isinstance(value, dict) or not {"distance_m", "amplitude_m", "motion", "seed", "results"} <= set(value):
-        raise ValueError("not a sequence")
-    return value

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import atexit
 import hashlib
-import os
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK, EvaluationConfig, episode_seeds
-from fixation_gym.evaluation.files import write_csv, write_json
-from fixation_gym.evaluation.missing_cells import run_missing
+from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.storage import EPISODES_FILE, SUMMARY_FILE, EpisodeKey, ResultStore, check_no_folders
+from fixation_gym.evaluation.storage import EPISODES_FILE, EpisodeKey
 from fixation_gym.experiments.necessity.statistics import AGENT, chosen_ways, summarise
+from fixation_gym.experiments.runner import Cell, Experiment
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
@@ -33,7 +30,6 @@ POLICIES = ("blind", "blind:slow")
 """Blind policies that see the target with the wrist camera."""
 QUICK_SCENARIOS = ("opaque", "screen", "clutter")
 
-Cell = dict[str, Any]
 Key = tuple[str, str, int]
 """(scenario, member, seed)"""
 
@@ -108,15 +104,6 @@ class NecessityConfig:
             members[f"{AGENT}:{digest[:12]}"] = str(self.agent)
         return members
 
-    def run_description(self) -> dict[str, Any]:
-        """Everything the result of one episode depends on, apart from its key."""
-        return {
-            "command": "necessity",
-            "seed": self.seed,
-            "gl": os.environ.get("MUJOCO_GL"),
-            "versions": installed_versions(),
-        }
-
     def evaluated(self) -> dict[EpisodeKey, bool] | None:
         """Success without collision of the evaluation by (scenario, seed); None without one.
 
@@ -179,6 +166,17 @@ def scenarios_with_obstacles() -> tuple[str, ...]:
 def cell_key(cell: Mapping[str, Any]) -> Key:
     """What tells the results of one run apart."""
     return cell["scenario"], cell["member"], cell["seed"]
+
+
+EXPERIMENT = Experiment(
+    command="necessity",
+    unit="episode",
+    file=EPISODES_FILE,
+    outputs=(ROWS_FILE, TABLE_FILE, FIGURE_FILE),
+    key=cell_key,
+    content=frozenset({"scenario", "member", "seed", "success", "collision"}),
+    note=lambda value: f"{value['scenario']}, {value['member']}",
+)
 
 
 _sims: list[PickSim] = []  # at most one: it is large
@@ -260,54 +258,22 @@ def measure(config: NecessityConfig, out: Path, run: Callable[[Cell], dict[str, 
     """
     from fixation_gym.experiments.necessity.figure import draw_figure
 
-    started = time.monotonic()
     ways = tuple(config.ways)
     evaluated = config.evaluated()
-    store: ResultStore[Key, dict[str, Any]] = ResultStore(
-        out, config.run_description(), EPISODES_FILE, key=cell_key, from_json=_checked, to_json=dict
-    )
-    with store:
-        check_no_folders(out, (ROWS_FILE, TABLE_FILE, FIGURE_FILE))
-
-        def episodes(cells: Mapping[Key, Cell]) -> tuple[list[dict[str, Any]], int]:
-            resumed = run_missing(
-                store,
-                cells,
-                run,
-                parse=dict,
-                note=lambda value: f"{value['scenario']}, {value['member']}",
-                unit="episode",
-                processes=config.workers,
-            )
-            return [store.finished[key] for key in cells], resumed
-
-        choosing, first = episodes(config.choosing())
-        judging, second = episodes(config.judging(chosen_ways(choosing, ways)))
+    with EXPERIMENT.opened(out, {"seed": config.seed}, run, config.workers) as folder:
+        choosing = folder.results(config.choosing().values())
+        judging = folder.results(config.judging(chosen_ways(choosing, ways)).values())
         close_sims()
         workers.close_worlds()
-        summary = {
-            **summarise([*choosing, *judging], ways, evaluated),
-            **config.run_description(),
+        about = {
             "ways": {name: asdict(way) for name, way in config.ways.items()},
             "quick": config.quick,
             "episodes": config.episode_count,
-            "episodes_resumed": first + second,
+            "episodes_resumed": folder.resumed,
             "commit": source_commit(),
-            "wall_s": time.monotonic() - started,
         }
-        write_json(out / SUMMARY_FILE, summary)
+        summary = folder.write_summary(summarise([*choosing, *judging], ways, evaluated), about)
         write_csv(out / ROWS_FILE, summary["rows"])
         write_csv(out / TABLE_FILE, summary["table"])
         draw_figure(out / FIGURE_FILE, summary["rows"], summary["table"])
     return summary
-
-
-def _checked(value: Any) -> dict[str, Any]:
-    """A stored episode.
-
-    Raises:
-        ValueError: if something of it is missing.
-    """
-    if not isinstance(value, dict) or not {"scenario", "member", "seed", "success", "collision"} <= set(value):
-        raise ValueError("not an episode")
-    return value

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
-import os
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fixation_gym.doctor import installed_versions
-from fixation_gym.errors import UsageError, check_names
-from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.evaluate import SEED_BLOCK
-from fixation_gym.evaluation.files import write_csv, write_json
-from fixation_gym.evaluation.missing_cells import run_missing
-from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders
+from fixation_gym.evaluation.files import write_csv
+from fixation_gym.evaluation.workers import prepare_process
+from fixation_gym.experiments.runner import Cell, Experiment, check_options, kept_rig
 from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
 from fixation_gym.experiments.scenarios.statistics import rows_of, summarise
 
@@ -28,7 +22,6 @@ if TYPE_CHECKING:
 RUNS_FILE, CSV_FILE, FIGURE_FILE = "runs.jsonl", "rows.csv", "scenarios.png"
 VIDEO_FILES = {scene: f"{scene}.mp4" for scene in SCENES}
 
-Cell = dict[str, Any]
 Key = tuple[str, str, int]
 """(scene, variant, seed)"""
 
@@ -53,29 +46,12 @@ class ScenariosConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SENSOR_NOISE
-
-        check_names([self.noise], SENSOR_NOISE, "sensor noise")
-        if self.seed < 0:
-            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
-        if not 1 <= self.instance_count <= SEED_BLOCK:
-            raise UsageError(f"--instances must be within 1..{SEED_BLOCK}, got {self.instances}")
-        workers.check_backend("loky", self.workers)
+        check_options(self.noise, self.seed, self.instance_count, "--instances", self.workers)
 
     @property
     def instance_count(self) -> int:
         """Random instances of every scene and variant."""
         return self.instances if self.instances is not None else 3 if self.quick else 20
-
-    def run_description(self) -> dict[str, Any]:
-        """Everything the result of one run depends on, apart from its key."""
-        return {
-            "command": "scenarios",
-            "seed": self.seed,
-            "noise": self.noise,
-            "gl": os.environ.get("MUJOCO_GL"),
-            "versions": installed_versions(),
-        }
 
     def cells(self) -> dict[Key, Cell]:
         """All runs. A seed's scenes come before those of the next, so that part of a run shows the whole."""
@@ -94,30 +70,30 @@ def cell_key(cell: Cell) -> Key:
     return cell["scene"], cell["variant"], cell["seed"]
 
 
+EXPERIMENT = Experiment(
+    command="scenarios",
+    unit="run",
+    file=RUNS_FILE,
+    outputs=(CSV_FILE, FIGURE_FILE, *VIDEO_FILES.values()),
+    key=cell_key,
+    content=frozenset({"scene", "variant", "seed", "frames"}),
+    note=lambda value: f"{value['scene']}, {value['variant']}",
+)
+
+
 def instance_rng(cell: Cell) -> np.random.Generator:
     """The generator of an instance and of its noise."""
     scene = (*SCENES, CLEAR).index(cell["scene"])
     return np.random.default_rng([cell["seed"], scene, VARIANTS.index(cell["variant"]), 4])
 
 
-_rigs: dict[str, ScenarioRig] = {}  # at most one: it is large
-
-
 def rig_for(noise: str) -> ScenarioRig:
     """The rig of this process with some sensor noise."""
-    from fixation_gym.gl import select_backend
-
-    select_backend()
-    import cv2
-
+    prepare_process()
     from fixation_gym.envs.config import SENSOR_NOISE
     from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
-    cv2.setNumThreads(1)  # images are small: threads cost more than they gain
-    if noise not in _rigs:
-        close_rigs()
-        _rigs[noise] = ScenarioRig(SENSOR_NOISE[noise])
-    return _rigs[noise]
+    return kept_rig(ScenarioRig, SENSOR_NOISE[noise])
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
@@ -129,13 +105,6 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     if cell["scene"] == CLEAR:
         return {**cell, **run_clear(rig, cell["variant"], rng)}
     return {**cell, **run_scene(rig, cell["scene"], cell["variant"], rng)}
-
-
-@atexit.register
-def close_rigs() -> None:
-    """Close the rig that ``run_cell`` keeps alive in this process."""
-    while _rigs:
-        _rigs.popitem()[1].close()
 
 
 def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
@@ -152,31 +121,11 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
     Raises:
         UsageError: if the folder cannot be used.
     """
-    started = time.monotonic()
-    cells = config.cells()
-    store: ResultStore[Key, dict[str, Any]] = ResultStore(
-        out, config.run_description(), RUNS_FILE, key=cell_key, from_json=_checked, to_json=dict
-    )
-    with store:
-        check_no_folders(out, (CSV_FILE, FIGURE_FILE, *VIDEO_FILES.values()))
-        resumed = run_missing(
-            store,
-            cells,
-            run,
-            parse=dict,
-            note=lambda value: f"{value['scene']}, {value['variant']}",
-            unit="run",
-            processes=config.workers,
-        )
-        summary = {
-            **summarise([store.finished[key] for key in cells]),
-            **config.run_description(),
-            "quick": config.quick,
-            "instances": config.instance_count,
-            "runs_resumed": resumed,
-            "wall_s": time.monotonic() - started,
-        }
-        write_json(out / SUMMARY_FILE, summary)
+    cells, settings = config.cells(), {"seed": config.seed, "noise": config.noise}
+    with EXPERIMENT.opened(out, settings, run, config.workers) as folder:
+        statistics = summarise(folder.results(cells.values()))
+        about = {"quick": config.quick, "instances": config.instance_count, "runs_resumed": folder.resumed}
+        summary = folder.write_summary(statistics, about)
         write_csv(out / CSV_FILE, rows_of(summary["scenes"]))
         if config.film:
             from fixation_gym.experiments.scenarios.pictures import film
@@ -185,16 +134,4 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
             videos = {scene: out / name for scene, name in VIDEO_FILES.items()}
             generators = {scene: instance_rng(cell) for scene, cell in examples.items()}
             film(rig_for(config.noise), generators, videos, out / FIGURE_FILE)
-        close_rigs()
     return summary
-
-
-def _checked(value: Any) -> dict[str, Any]:
-    """A stored run.
-
-    Raises:
-        ValueError: if something of it is missing.
-    """
-    if not isinstance(value, dict) or not {"scene", "variant", "seed", "frames"} <= set(value):
-        raise ValueError("not a run")
-    return value

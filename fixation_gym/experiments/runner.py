@@ -1,0 +1,141 @@
+"""What the experiments share: options of a run, its resumable folder of results, and the rig that a process keeps."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import time
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fixation_gym.doctor import installed_versions
+from fixation_gym.errors import UsageError, check_names
+from fixation_gym.evaluation import workers
+from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.files import write_json
+from fixation_gym.evaluation.missing_cells import run_missing
+from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders
+
+Cell = dict[str, Any]
+"""One piece of work, JSON-able and picklable."""
+Result = dict[str, Any]
+"""What came of a cell, JSON-able; the cell's key is in it."""
+Key = tuple[Any, ...]
+Rig = TypeVar("Rig")
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """How the results of an experiment are told apart, kept and shown."""
+
+    command: str
+    unit: str
+    """Name of a piece of work."""
+    file: str
+    """Results, one per line."""
+    outputs: tuple[str, ...]
+    """Files that are written at the end, beside the summary."""
+    key: Callable[[Cell], Key]
+    """What tells the results of one run apart."""
+    content: frozenset[str]
+    """Names that every result has."""
+    note: Callable[[Result], str]
+    """What the progress bar says after a result."""
+
+    @contextmanager
+    def opened(
+        self, out: Path, settings: Mapping[str, Any], run: Callable[[Cell], Result], processes: int
+    ) -> Iterator[Folder]:
+        """Keep a folder for one run, until all its files are written.
+
+        Args:
+            out: folder; made if needed.
+            settings: what a result depends on, apart from its key, GL library and versions.
+            run: runs one cell, in a worker process if there are several.
+            processes: number of worker processes.
+
+        Raises:
+            UsageError: if the folder cannot be used.
+        """
+        gl = os.environ.get("MUJOCO_GL")
+        description = {"command": self.command, **settings, "gl": gl, "versions": installed_versions()}
+        store: ResultStore[Key, Result] = ResultStore(out, description, self.file, self.key, self._checked, dict)
+        with store:
+            check_no_folders(out, self.outputs)
+            yield Folder(self, store, description, run, processes, time.monotonic())
+        close_rig()
+
+    def _checked(self, value: Any) -> Result:
+        """A stored result.
+
+        Raises:
+            ValueError: if something of it is missing.
+        """
+        if not isinstance(value, dict) or not self.content <= set(value):
+            raise ValueError(f"not a result of {self.command}")
+        return value
+
+
+@dataclass
+class Folder:
+    """The results of one run, while their folder is open."""
+
+    experiment: Experiment
+    store: ResultStore[Key, Result]
+    description: Mapping[str, Any]
+    run: Callable[[Cell], Result]
+    processes: int
+    started: float
+    resumed: int = 0
+    """How many of the results asked for were there before."""
+
+    def results(self, cells: Iterable[Cell]) -> list[Result]:
+        """Results of cells, in their order; those that the folder does not have yet are run."""
+        by_key = {self.experiment.key(cell): cell for cell in cells}
+        note, unit = self.experiment.note, self.experiment.unit
+        self.resumed += run_missing(self.store, by_key, self.run, dict, note, unit, self.processes)
+        return [self.store.finished[key] for key in by_key]
+
+    def write_summary(self, statistics: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Write and return statistics, what was run and ``wall_s``, the time of this call without earlier ones."""
+        summary = {**statistics, **self.description, **settings, "wall_s": time.monotonic() - self.started}
+        write_json(self.store.folder / SUMMARY_FILE, summary)
+        return summary
+
+
+def check_options(noise: str, seed: int, count: int, count_option: str, processes: int) -> None:
+    """Check the options that experiments with a rig have in common.
+
+    Raises:
+        UsageError: naming the first bad value and what is allowed.
+    """
+    from fixation_gym.envs.config import SENSOR_NOISE
+
+    check_names([noise], SENSOR_NOISE, "sensor noise")
+    if seed < 0:
+        raise UsageError(f"--seed must be 0 or more, got {seed}")
+    if not 1 <= count <= SEED_BLOCK:
+        raise UsageError(f"{count_option} must be within 1..{SEED_BLOCK}, got {count}")
+    workers.check_backend("loky", processes)
+
+
+_rigs: dict[tuple[Any, ...], Any] = {}  # at most one: they are large
+
+
+def kept_rig(build: Callable[..., Rig], *settings: Hashable) -> Rig:
+    """What ``build`` makes of the settings, kept for the next cell of this process; another rig is closed first."""
+    key = (build, *settings)
+    if key not in _rigs:
+        close_rig()
+        _rigs[key] = build(*settings)
+    return _rigs[key]
+
+
+@atexit.register
+def close_rig() -> None:
+    """Close the rig that this process keeps."""
+    while _rigs:
+        _rigs.popitem()[1].close()
