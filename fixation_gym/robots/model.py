@@ -134,6 +134,10 @@ class Arm:
     """Speed of the camera along one axis at action 1, m/s."""
     angular_speed: float
     """Its rotation rate about one axis at action 1, rad/s."""
+    position_std: float
+    """Noise of each camera pose that the kinematics give, per axis, m ..."""
+    rotation_std: float
+    """... and rad."""
     reach: Reach
 
     @property

@@ -55,6 +55,8 @@ _ARM = Arm(
     joint_speeds=(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),  # Franka's limits
     linear_speed=0.15,
     angular_speed=0.8,
+    position_std=1e-4,  # both as in the preset "conservative" of sensor noise
+    rotation_std=2e-4,
     reach=_REACH,
 )
 

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from test_fixation_constraint import CAMERA, follow
+from test_fixation_constraint import CAMERA, DT, circling, follow
 
 from fixation_gym.perception import Perception
 from fixation_gym.perception.distance.estimator import (
@@ -54,3 +54,15 @@ def test_every_estimator_answers_the_same_again(name):
     again, _ = follow(perception, range(30))
     assert first.distance_m == again.distance_m
     assert first.distance_std_m == again.distance_std_m
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_every_estimator_answers_for_another_camera(name):
+    estimator = ESTIMATORS[name][0]()
+    fixation, _ = follow(Perception(CAMERA, estimator=estimator), range(30))
+    farther = circling(29 * DT)
+    farther[:3, 3] -= 0.1 * farther[:3, 2]
+    moved = estimator.fixation(farther, None)
+    assert not moved.visible
+    assert moved.distance_m == pytest.approx(fixation.distance_m + 0.1, abs=1e-3)
+    np.testing.assert_allclose(moved.point_base, fixation.point_base, atol=1e-3)

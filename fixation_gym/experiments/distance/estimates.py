@@ -2,46 +2,117 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fixation_gym.envs.config import SensorNoise
-from fixation_gym.experiments.distance.recording import Frame, Recording, filter_settings, pose_estimate
+from fixation_gym.experiments.distance.recording import Recording, calibrating
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, CYCLE_RATE, INTRINSICS
+from fixation_gym.geometry.rigid import transform
 from fixation_gym.geometry.twist import skew
-from fixation_gym.perception.distance import calibrating_filter
-from fixation_gym.perception.distance import flow_filters as flow_distance_filters
-from fixation_gym.perception.distance import pose_filter as distance_filters
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.distance import flow_filters, pose_filter
+from fixation_gym.perception.distance.estimator import DistanceEstimator, Frames, PoseEstimator
 from fixation_gym.perception.distance.fixation_constraint import gaze_drift
 from fixation_gym.perception.distance.flow_filters import FlowFilterSettings, Kind
 from fixation_gym.perception.distance.flow_samples import FLOW_NAMES, FlowName
-from fixation_gym.perception.distance.pose_filter import DistanceSettings
+from fixation_gym.perception.distance.following import Frame, mean_variance
+from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState, Fixation
+from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.types import FloatArray
 
 ONSET_TOLERANCE, JUMP_TOLERANCE = 0.03, 0.05
 """Relative errors that count as settled after the onset of motion and after the jump."""
 
 
-@dataclass(frozen=True)
-class Estimator:
-    """One way to get the distance from a recording."""
+class RecordedFlow:
+    """A flow filter on the twists and the flow of a rig; the paper's with kind "hard".
+
+    Frame k brings the flow of frame k - 1: the filter hears of both, and is predicted to now. While the target is not
+    seen it goes on by twist.
+    """
+
+    def __init__(self, kind: Kind, flow: FlowName, settings: FlowFilterSettings) -> None:
+        """Start at the first guess."""
+        self._kind: Kind = kind
+        self._flow: FlowName = flow
+        self._settings = settings
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._state = flow_filters.initialise(self._kind, self._settings)
+        self._drift = np.zeros(2)
+        self._last: Frame | None = None
+
+    def add_frame(self, frame: Frame) -> None:
+        """Take in the twist and the flow of the frame before."""
+        last, self._last = self._last, frame
+        if last is None or last.rig is None or frame.rig is None:
+            return
+        dt = round(frame.time - last.time, 9)  # all equal, as those of the rig are
+        before, now = (f.segmentation.centroid if f.segmentation.visible else None for f in (last, frame))
+        self._drift = gaze_drift(self._drift, before, now, dt, CENTROID_STD_PX / INTRINSICS.fx)
+        flow = None if frame.rig.flow is None else frame.rig.flow[self._flow]
+        twist, settings = last.camera_twist, self._settings
+        state = flow_filters.update(self._state, twist, last.rig.twist_cov, flow, settings, self._drift)
+        self._state = flow_filters.predict(state, dt, settings)
+
+    def add_flow(self, flow: Flow, frames: Frames) -> None:
+        """Flow of whole images is not used."""
+
+    def fixation(self, T_base_cam: FloatArray, seen: Segmentation | None) -> Fixation:
+        """What is known of the target, for the camera of the last frame."""
+        visible = seen is not None and seen.visible
+        centroid = seen.centroid if seen is not None and visible else np.zeros(2)
+        depth, std = flow_filters.distance_of(self._state, centroid)
+        point = transform(T_base_cam, depth * np.array([*centroid, 1.0]))
+        return Fixation(visible, np.array(centroid), point, depth, std, 2.0 * self._state.nis, True)
+
+
+def follow_unguarded(
+    state: DistanceState | None, before: Frame | None, now: Frame, settings: DistanceSettings
+) -> tuple[DistanceState | None, bool]:
+    """As ``follow_poses``, without its watch for what covers the target: nothing does here."""
+    seen = now.segmentation
+    if state is not None and before is not None:
+        state = pose_filter.predict(state, now.time - before.time, settings, seen.visible)
+    if not seen.visible:
+        return state, False
+    if state is None:
+        return pose_filter.initialise(seen.centroid, now.T_base_cam, settings), False
+    size = math.sqrt(mean_variance(seen))
+    return pose_filter.update(state, seen.centroid, now.T_base_cam, settings, size, seen.touches_border), False
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """An estimator and its name in the results."""
 
     name: str
     """"hard", "free", "pose", or "pose3": the three-state filter of the pick task with its own settings."""
+    estimator: DistanceEstimator
     flow: FlowName | None = None
     """Which flow it uses, if any."""
     hand_eye: bool = True
     """False: the same run with perfect hand-eye calibration."""
 
 
-def estimators(motion: str) -> tuple[Estimator, ...]:
+def methods(recording: Recording, noise: SensorNoise) -> tuple[Method, ...]:
     """Those that make sense: without rotation the fixation constraint would put the target at infinity."""
-    kinds = ("hard", "free") if motion == "fixation" else ("free",)
-    on_flow = tuple(Estimator(kind, flow) for kind in kinds for flow in FLOW_NAMES)
-    return (*on_flow, Estimator("pose"), Estimator("pose", hand_eye=False), Estimator("pose3"))
+    condition, guess = recording.condition, recording.first_guess_m
+    kinds: tuple[Kind, ...] = ("hard", "free") if condition.motion == "fixation" else ("free",)
+    settings = FlowFilterSettings(initial_distance_m=guess, jerk=condition.amplitude_m * CYCLE_RATE**3)
+    exact = replace(noise, hand_eye_m=0.0, hand_eye_rad=0.0)
+    return (
+        *(Method(kind, RecordedFlow(kind, flow, settings), flow) for kind in kinds for flow in FLOW_NAMES),
+        Method("pose", calibrating(noise, guess)),
+        Method("pose", calibrating(exact, guess), hand_eye=False),
+        Method("pose3", PoseEstimator(DistanceSettings(initial_distance_m=guess), follow_unguarded)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,83 +129,37 @@ class Track:
     """Normalised innovation squared per degree of freedom."""
 
 
-def run(recording: Recording, estimator: Estimator, noise: SensorNoise) -> Track:
+def run(recording: Recording, method: Method) -> Track:
     """Run one estimator over all frames."""
-    if estimator.name == "pose":
-        rows = recording.pose_track if estimator.hand_eye else _calibrated_pose(recording, noise)
-    elif estimator.name == "pose3":
-        rows = _pose3(recording)
-    else:
-        rows = _flow(recording, estimator)
-    return Track(*np.array(list(rows)).T)
-
-
-def _calibrated_pose(recording: Recording, noise: SensorNoise) -> Iterator[tuple[float, ...]]:
-    """The pose filter as if the hand-eye calibration had been perfect."""
-    settings = filter_settings(noise, recording.first_guess_m, hand_eye=False)
-    state = None
+    rows = []
+    method.estimator.reset()
     for frame in recording.frames:
-        sighting = replace(frame.sighting, T_base_cam=frame.T_base_cam_calibrated)
-        state = calibrating_filter.advance(state, sighting, recording.period, settings)
-        yield pose_estimate(state, sighting)
+        seen = frame.seen if method.hand_eye else replace(frame.seen, T_base_cam=frame.T_base_cam_calibrated)
+        method.estimator.add_frame(seen)
+        rows.append(_numbers(method.estimator.fixation(seen.T_base_cam, seen.segmentation)))
+    return Track(*np.array(rows).T)
 
 
-def _pose3(recording: Recording) -> Iterator[tuple[float, ...]]:
-    settings = DistanceSettings(initial_distance_m=recording.first_guess_m)
-    state = None
-    for frame in recording.frames:
-        sighting = frame.sighting
-        pose, centroid = sighting.T_base_cam, sighting.centroid
-        if state is not None:
-            state = distance_filters.predict(state, recording.period, settings, centroid is not None)
-        if centroid is not None:
-            if state is None:
-                state = distance_filters.initialise(centroid, pose, settings)
-            else:
-                state = distance_filters.update(
-                    state, centroid, pose, settings, sighting.image_std, frame.touches_border
-                )
-        if state is None:
-            yield (np.nan,) * 5
-            continue
-        depth, std, _ = distance_filters.distance_at(state, pose, settings)
-        yield depth, std, depth, std, state.nis / 2.0
+def _numbers(fixation: Fixation) -> tuple[float, ...]:
+    """A row of a ``Track``."""
+    if not fixation.initialised:
+        return (math.nan,) * 5
+    robot = fixation.distance_m, fixation.distance_std_m
+    return (*robot, *(fixation.lens or robot), fixation.nis / 2.0)
 
 
-def _flow(recording: Recording, estimator: Estimator) -> Iterator[tuple[float, ...]]:
-    """Frame k brings the flow of frame k - 1; the state is of that time and is predicted to now."""
-    kind: Kind = "hard" if estimator.name == "hard" else "free"
-    dt = recording.period
-    settings = FlowFilterSettings(
-        initial_distance_m=recording.first_guess_m, jerk=recording.condition.amplitude_m * CYCLE_RATE**3
-    )
-    state = flow_distance_filters.initialise(kind, settings)
-    drift = np.zeros(2)
-    last: Frame | None = None
-    for frame in recording.frames:
-        if last is not None:
-            flow = None if frame.flow is None or estimator.flow is None else frame.flow[estimator.flow]
-            seen = last.sighting.centroid, frame.sighting.centroid
-            drift = gaze_drift(drift, *seen, dt, CENTROID_STD_PX / INTRINSICS.fx)
-            state = flow_distance_filters.update(state, last.sighting.twist, last.twist_cov, flow, settings, drift)
-            state = flow_distance_filters.predict(state, dt, settings)
-        depth, std = flow_distance_filters.distance_of(state, frame.sighting.centroid)
-        yield depth, std, depth, std, state.nis
-        last = frame
-
-
-def assess(recording: Recording, estimator: Estimator, track: Track) -> dict[str, Any]:
+def assess(recording: Recording, method: Method, track: Track) -> dict[str, Any]:
     """Sums over the measured samples and settling times, JSON-able."""
     frames = recording.frames
     counted = recording.measured
     distance = recording.condition.distance_m
-    result: dict[str, Any] = {"estimator": estimator.name, "flow": estimator.flow, "hand_eye": estimator.hand_eye}
+    result: dict[str, Any] = {"estimator": method.name, "flow": method.flow, "hand_eye": method.hand_eye}
     pairs = {
         "robot": (track.robot, track.robot_std, np.array([frame.distance_robot_m for frame in frames])),
         "lens": (track.lens, track.lens_std, np.array([frame.distance_lens_m for frame in frames])),
     }
     for name, (estimate, std, truth) in pairs.items():
-        if not estimator.hand_eye:
+        if not method.hand_eye:
             truth = pairs["lens"][2]
         error = (estimate - truth)[counted]
         nees = (error / std[counted]) ** 2
@@ -146,7 +171,7 @@ def assess(recording: Recording, estimator: Estimator, track: Track) -> dict[str
             "nees": float(nees.sum()),
             "std": float(std[counted].sum()),
         }
-    truth = pairs["robot" if estimator.hand_eye else "lens"][2]
+    truth = pairs["robot" if method.hand_eye else "lens"][2]
     relative = np.abs(track.robot - truth) / distance
     one = round(1.0 / recording.period)
     jump = counted.stop - 1
@@ -176,14 +201,15 @@ def bounds(recording: Recording, centroid_std: float, flow_std_px: float = 0.2) 
     """
     frames, counted = recording.frames, recording.measured
     z = recording.condition.distance_m
+    known = [frame.seen.rig for frame in frames if frame.seen.rig is not None]
     by_pose = np.hstack([np.eye(3), -skew(np.array([0.0, 0.0, z]))])
-    noise = np.mean([by_pose @ frame.sighting.pose_cov @ by_pose.T for frame in frames], axis=0)
+    noise = np.mean([by_pose @ rig.pose_cov @ by_pose.T for rig in known], axis=0)
     ray = centroid_std**2 + 0.5 * (noise[0, 0] + noise[1, 1]) / z**2
-    positions = np.array([frame.sighting.T_base_cam[:3, 3] for frame in frames])
+    positions = np.array([frame.seen.T_base_cam[:3, 3] for frame in frames])
     count = np.arange(1, len(frames) + 1)
     spread = np.cumsum((positions**2).sum(1)) - (np.cumsum(positions, axis=0) ** 2).sum(1) / count
     pose = np.sqrt(z**4 * ray / spread[counted] + noise[2, 2])
-    twist = np.mean([frame.twist_cov for frame in frames], axis=0)
+    twist = np.mean([rig.twist_cov for rig in known], axis=0)
     s_v, s_w = 0.5 * (twist[0, 0] + twist[1, 1]), 0.5 * (twist[3, 3] + twist[4, 4])
     s_u = (flow_std_px * np.sqrt(0.1) / (INTRINSICS.fx * recording.period)) ** 2
     travelled = (recording.condition.amplitude_m * CYCLE_RATE) ** 2 * count[counted]

@@ -6,8 +6,7 @@ any rotation ("translation"). After the measurement the print jumps, and the cir
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -31,11 +30,12 @@ from fixation_gym.experiments.distance.sequence import (
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.perception.detection.colour import segment
-from fixation_gym.perception.distance import calibrating_filter
-from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
+from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings
+from fixation_gym.perception.distance.estimator import CalibratingEstimator
 from fixation_gym.perception.distance.flat_target import coverage, flat_centroid
-from fixation_gym.perception.distance.flow_filters import FlowSamples
-from fixation_gym.perception.distance.flow_samples import CutOut, FlowName, sample_flow
+from fixation_gym.perception.distance.flow_samples import CutOut, sample_flow
+from fixation_gym.perception.distance.following import Frame, RigMeasurement
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
 
@@ -43,22 +43,19 @@ _GAZE_GAIN, _POSITION_GAIN, _TURN_GAIN = 4.0, 2.0, 2.0
 """1/s."""
 _ATTENTION_PX = 64
 """Images are looked at up to this far around where the target was; all of the image when it is lost."""
+_NO_IMAGE = np.zeros((0, 0), np.float32)
+"""No estimator looks at the image itself, and 276 of them would take much room."""
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
-    """One instant, as measured and as it was."""
+class Instant:
+    """One frame, as measured and as it was."""
 
-    time: float
-    sighting: Sighting
-    """Believed pose, twist, and centroid of the flat target (``flat_centroid``)."""
+    seen: Frame
+    """What estimators get. The centroid is that of the flat target (``flat_centroid``), the mask that of the part of
+    the image that was looked at."""
     T_base_cam_calibrated: FloatArray
     """Measured pose without the hand-eye error, shape (4, 4)."""
-    touches_border: bool
-    twist_cov: FloatArray
-    """Covariance of the measured twist, shape (6, 6)."""
-    flow: dict[FlowName, FlowSamples] | None
-    """Flow at the time of the previous frame."""
     distance_robot_m: float
     """True depth of the print in the camera frame that the robot believes in."""
     distance_lens_m: float
@@ -72,9 +69,7 @@ class Recording:
     """A sequence."""
 
     condition: Condition
-    frames: tuple[Frame, ...]
-    pose_track: tuple[tuple[float, ...], ...]
-    """Per frame what the pose filter says, which runs along for the gaze servo: see ``pose_estimate``."""
+    frames: tuple[Instant, ...]
     first_guess_m: float
     """Distance with which every estimator starts: off by up to a factor of 2, log-uniform."""
 
@@ -87,19 +82,20 @@ class Recording:
     @property
     def period(self) -> float:
         """Time from frame to frame, s."""
-        return self.frames[1].time - self.frames[0].time
+        return self.frames[1].seen.time - self.frames[0].seen.time
 
 
-def filter_settings(noise: SensorNoise, first_guess_m: float, hand_eye: bool = True) -> CalibratingSettings:
-    """Settings of the pose filter for a sensor noise preset."""
-    return CalibratingSettings(
+def calibrating(noise: SensorNoise, first_guess_m: float) -> CalibratingEstimator:
+    """The estimator on poses and centroids for a sensor noise preset."""
+    settings = CalibratingSettings(
         initial_distance_m=first_guess_m,
         centroid_std=CENTROID_STD_PX / INTRINSICS.fx,
         centroid_std_size=0.0,  # the centroid of a flat print of known normal has no error that grows with its size
-        hand_eye_m=noise.hand_eye_m if hand_eye else 0.0,
-        hand_eye_rad=noise.hand_eye_rad if hand_eye else 0.0,
+        hand_eye_m=noise.hand_eye_m,
+        hand_eye_rad=noise.hand_eye_rad,
         image_age_s=noise.image_latency_s,
     )
+    return CalibratingEstimator(settings)
 
 
 class _Sensors:
@@ -111,7 +107,7 @@ class _Sensors:
         self._window: tuple[int, int, int, int] | None = None
         self._cut_outs: list[CutOut] = []
 
-    def measure(self, time: float, image: ImageArray, inverse_distance: float) -> Frame:
+    def measure(self, time: float, image: ImageArray, inverse_distance: float) -> Instant:
         noise, rng, arm = self._noise, self._rng, self._rig.arm
         joint_pos, joint_vel = sensors.measure_joints(arm.joint_pos, arm.joint_vel, noise, rng)
         error = joint_pos - arm.joint_pos
@@ -120,7 +116,7 @@ class _Sensors:
         calibrated = sensors.measure_camera_pose(arm.camera_pose, arm.jacobian, error, np.zeros(6))
         twist = sensors.measure_camera_twist(arm.jacobian, joint_vel, self._errors)
         motions = arm.jacobian @ arm.jacobian.T
-        centroid, image_std, touches, cut_out = self._look(time, image, believed)
+        found, cut_out = self._look(time, image, believed)
         self._cut_outs = [*self._cut_outs[-2:], cut_out]
         flow = None
         if len(self._cut_outs) == 3:
@@ -130,22 +126,18 @@ class _Sensors:
         exact = sensors.measure_camera_pose(arm.camera_pose, arm.jacobian, np.zeros_like(error), hand_eye)
         in_lens = arm.camera_pose[:3, :3].T @ (target - arm.camera_pose[:3, 3])
         gaze_error = INTRINSICS.project(in_lens) - [INTRINSICS.cx, INTRINSICS.cy]
-        return Frame(
-            time=time,
-            sighting=Sighting(believed, noise.joint_pos_rad**2 * motions, twist, centroid, image_std),
+        twist_cov = noise.joint_vel_rad_s**2 * motions + 1e-10 * np.eye(6)
+        known = RigMeasurement(noise.joint_pos_rad**2 * motions, twist_cov, flow)
+        return Instant(
+            seen=Frame(time, _NO_IMAGE, believed, twist, found, known),
             T_base_cam_calibrated=calibrated,
-            touches_border=touches,
-            twist_cov=noise.joint_vel_rad_s**2 * motions + 1e-10 * np.eye(6),
-            flow=flow,
             distance_robot_m=float(exact[:3, 2] @ (target - exact[:3, 3])),
             distance_lens_m=float(in_lens[2]),
             gaze_error_px=float(np.linalg.norm(gaze_error)),
         )
 
-    def _look(
-        self, time: float, image: ImageArray, T_base_cam: FloatArray
-    ) -> tuple[FloatArray | None, float, bool, CutOut]:
-        """Centroid, size, whether the border is touched, and the cut-out that was looked at."""
+    def _look(self, time: float, image: ImageArray, T_base_cam: FloatArray) -> tuple[Segmentation, CutOut]:
+        """The target, and the cut-out that was looked at."""
         left, top, right, bottom = self._window or (0, 0, INTRINSICS.width, INTRINSICS.height)
         seen = sensors.measure_image(image[top:bottom, left:right], self._noise, self._errors.exposure, self._rng)
         camera = Intrinsics(
@@ -156,7 +148,7 @@ class _Sensors:
         cut_out = CutOut(time, grey, (left, top), found.mask, T_base_cam)
         if not found.visible:
             self._window = None
-            return None, 0.0, False, cut_out
+            return found, cut_out
         columns, rows = np.flatnonzero(found.mask.any(axis=0)), np.flatnonzero(found.mask.any(axis=1))
         self._window = (
             max(0, left + int(columns[0]) - _ATTENTION_PX),
@@ -167,54 +159,45 @@ class _Sensors:
         # The print faces the middle of the circle, and the robot knows how it is turned against that view.
         normal = T_base_cam[:3, :3].T @ HOME[:3, 2]
         centroid = flat_centroid(coverage(seen, found.mask), camera, normal)
-        return centroid, math.sqrt(0.5 * float(np.trace(found.second_moments))), found.touches_border, cut_out
+        share = camera.width * camera.height / (INTRINSICS.width * INTRINSICS.height)
+        return replace(found, centroid=centroid, area_fraction=share * found.area_fraction), cut_out
 
 
 def record(rig: PrintRig, condition: Condition, noise: SensorNoise, rng: np.random.Generator) -> Recording:
     """Run one sequence on the simulated arm."""
     circle = Circle(condition, rng)
     first_guess = condition.distance_m * 2.0 ** rng.uniform(-1.0, 1.0)
-    settings = filter_settings(noise, first_guess)
+    estimator = calibrating(noise, first_guess)
     target = condition.print_position()
     start = circle.at(0.0)[0]
     ahead = target if condition.motion == "fixation" else start + HOME[:3, 2]
     rig.reset(look_at(start, ahead, np.array([0.0, 0.0, 1.0])), condition.print_width_m, target)
     sensing = _Sensors(rig, noise, rng)
     jump_at = round((BURN_IN_S + MEASURE_S) / rig.dt)
-    frames: list[Frame] = []
-    track: list[tuple[float, ...]] = []
-    state, distance, image = None, first_guess, rig.image()
+    frames: list[Instant] = []
+    distance, image = first_guess, rig.image()
     for step in range(jump_at + round(AFTER_JUMP_S / rig.dt) + 1):
         frame = sensing.measure(step * rig.dt, image, 1.0 / distance)
         frames.append(frame)
-        state = calibrating_filter.advance(state, frame.sighting, rig.dt, settings)
-        track.append(pose_estimate(state, frame.sighting))
-        distance = track[-1][0] if state is not None else first_guess
+        estimator.add_frame(frame.seen)
+        distance = estimator.fixation(frame.seen.T_base_cam, frame.seen.segmentation).distance_m
         if step == jump_at:
             rig.move_print(target + condition.jump(rng))
-        twist = _command(condition.motion, circle, frame, distance, frames[0], rig.dt)
+        twist = _command(condition.motion, circle, frame.seen, distance, frames[0].seen, rig.dt)
         image = rig.image(rig.step(twist, noise.image_latency_s))
-    return Recording(condition, tuple(frames), tuple(track), first_guess)
-
-
-def pose_estimate(state: CalibratingState | None, sighting: Sighting) -> tuple[float, ...]:
-    """Depth and its standard deviation, for the robot and for the lens, and NIS per degree of freedom; or NaNs."""
-    if state is None:
-        return (math.nan,) * 5
-    now = calibrating_filter.distance_at(state, sighting)
-    return now.robot, now.robot_std, now.lens, now.lens_std, state.nis / 2.0
+    return Recording(condition, tuple(frames), first_guess)
 
 
 def _command(motion: Motion, circle: Circle, frame: Frame, distance: float, first: Frame, dt: float) -> FloatArray:
     """Camera twist for the next period, shape (6,)."""
     position, _ = circle.at(frame.time)
     _, velocity = circle.at(frame.time + 0.5 * dt)
-    pose = frame.sighting.T_base_cam
+    pose = frame.T_base_cam
     v = pose[:3, :3].T @ (velocity + _POSITION_GAIN * (position - pose[:3, 3]))
     if motion == "translation":
-        turn = Rotation.from_matrix(pose[:3, :3].T @ first.sighting.T_base_cam[:3, :3]).as_rotvec()
+        turn = Rotation.from_matrix(pose[:3, :3].T @ first.T_base_cam[:3, :3]).as_rotvec()
         return np.clip(np.concatenate([v, _TURN_GAIN * turn]), -ROBOT.arm.twist_limits, ROBOT.arm.twist_limits)
     roll = _TURN_GAIN * float(np.clip(pose[2, 0], -0.5, 0.5))  # x axis back to the horizontal
-    centroid = np.zeros(2) if frame.sighting.centroid is None else frame.sighting.centroid
+    centroid = frame.segmentation.centroid if frame.segmentation.visible else np.zeros(2)
     w = gaze_rotation(centroid, _GAZE_GAIN, 1.0 / distance, v, roll)
     return np.clip(np.array([*v, *w, roll]), -ROBOT.arm.twist_limits, ROBOT.arm.twist_limits)

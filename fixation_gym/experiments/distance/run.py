@@ -99,7 +99,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     """Record the sequence of a cell and run every estimator on it; returns the cell with ``results`` and ``bounds``."""
     prepare_process()
     from fixation_gym.envs.config import SENSOR_NOISE
-    from fixation_gym.experiments.distance.estimates import assess, bounds, estimators, run
+    from fixation_gym.experiments.distance.estimates import assess, bounds, methods, run
     from fixation_gym.experiments.distance.recording import record
     from fixation_gym.experiments.distance.rig import PrintRig
     from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX
@@ -110,16 +110,14 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     lengths = round(condition.distance_m * 1e4), round(condition.amplitude_m * 1e4)
     rng = np.random.default_rng([condition.seed, *lengths, motion])
     recording = record(kept_rig(PrintRig), condition, noise, rng)
-    results = [
-        assess(recording, estimator, run(recording, estimator, noise)) for estimator in estimators(cell["motion"])
-    ]
+    results = [assess(recording, method, run(recording, method)) for method in methods(recording, noise)]
     errors = [frame.gaze_error_px for frame in recording.frames[recording.measured]]
     value = {
         **cell,
         "results": results,
         "bounds": bounds(recording, CENTROID_STD_PX / INTRINSICS.fx),
         "gaze_error_px": float(np.mean(errors)),
-        "visible": float(np.mean([frame.sighting.centroid is not None for frame in recording.frames])),
+        "visible": float(np.mean([frame.seen.segmentation.visible for frame in recording.frames])),
     }
     return cast("dict[str, Any]", _without_nan(value))
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception.detection.segmentation import Segmentation
 from fixation_gym.perception.distance import calibrating_filter, flow_filters, pose_filter
@@ -22,20 +22,17 @@ from fixation_gym.perception.distance.calibrating_filter import CalibratingSetti
 from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze, ConstraintSettings, gaze_drift
 from fixation_gym.perception.distance.flow_filters import FlowFilterState, FlowSamples, Kind
 from fixation_gym.perception.distance.flow_samples import edge_samples
-from fixation_gym.perception.distance.following import (
-    Frame,
-    follow_constraint,
-    follow_poses,
-    mean_variance,
-    mended,
-)
+from fixation_gym.perception.distance.following import Frame, follow_constraint, follow_poses, mean_variance, mended
 from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState, Fixation
 from fixation_gym.perception.distance.target_motion import InverseDepth, contradiction, target_inverse_depth
 from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.zero_flow.zero_flow import widened_on_grid
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 Frames = tuple[Frame, Frame, Frame]
+Follow = Callable[[DistanceState | None, Frame | None, Frame, DistanceSettings], tuple[DistanceState | None, bool]]
+"""Advances the distance by a frame, as ``follow_poses`` does."""
 
 _OWN_DEPTHS = 5
 """Frames over which the motion of the target's own pixels is believed."""
@@ -84,9 +81,9 @@ def _described(
 class PoseEstimator:
     """The three-state filter on poses and centroids, begun again where the target's own motion contradicts it."""
 
-    def __init__(self, settings: DistanceSettings | None = None) -> None:
-        """Start without knowledge."""
-        self._settings = settings or DistanceSettings()
+    def __init__(self, settings: DistanceSettings | None = None, follow: Follow = follow_poses) -> None:
+        """Start without knowledge; ``follow`` says how a frame changes the estimate."""
+        self._settings, self._follow = settings or DistanceSettings(), follow
         self.reset()
 
     def reset(self) -> None:
@@ -101,7 +98,7 @@ class PoseEstimator:
         before = self._before
         if not frame.segmentation.visible or (before is not None and frame.time - before.time > _MAX_GAP_S):
             self._own_depths.clear()
-        self._state, covering = follow_poses(self._state, before, frame, self._settings)
+        self._state, covering = self._follow(self._state, before, frame, self._settings)
         self._covered_time = frame.time if covering else self._covered_time
         self._before = frame
 
@@ -252,12 +249,9 @@ def _doubted(samples: FlowSamples) -> FlowSamples:
 class CalibratingEstimator:
     """Poses and centroids over a window, with hand-eye error and image age among the unknowns."""
 
-    def __init__(
-        self, settings: DistanceSettings | None = None, calibration: CalibratingSettings | None = None
-    ) -> None:
-        """Start without knowledge; ``settings`` have the noise of the poses."""
-        self._settings = settings or DistanceSettings()
-        self._calibration = calibration or CalibratingSettings(
+    def __init__(self, settings: CalibratingSettings | None = None) -> None:
+        """Start without knowledge."""
+        self._settings = settings or CalibratingSettings(
             centroid_std=1e-3, centroid_std_size=0.02, hand_eye_m=1e-3, hand_eye_rad=2e-3, image_age_s=8e-3
         )
         self.reset()
@@ -271,28 +265,33 @@ class CalibratingEstimator:
     def add_frame(self, frame: Frame) -> None:
         """Add a frame to the window."""
         dt = 0.0 if self._last is None else frame.time - self._time
-        self._last, self._time = self._sighting(frame), frame.time
-        self._state = calibrating_filter.advance(self._state, self._last, dt, self._calibration)
-
-    def _sighting(self, frame: Frame) -> Sighting:
-        seen = frame.segmentation
-        stds = [self._settings.position_std_m] * 3 + [self._settings.rotation_std_rad] * 3
-        size = math.sqrt(mean_variance(seen)) if seen.visible else 0.0
-        centroid = seen.centroid if seen.visible else None
-        return Sighting(frame.T_base_cam, np.diag(np.square(stds)), frame.camera_twist, centroid, size)
+        self._last, self._time = _sighting(frame), frame.time
+        self._state = calibrating_filter.advance(self._state, self._last, dt, self._settings)
 
     def add_flow(self, flow: Flow, frames: Frames) -> None:
         """Flow is not used."""
 
     def fixation(self, T_base_cam: FloatArray, seen: Segmentation | None) -> Fixation:
         """What is known of the target."""
-        if self._state is None or self._last is None:
-            return _described(None, T_base_cam, seen, self._settings)
-        now = calibrating_filter.distance_at(self._state, self._last)
-        point = self._state.T_base_anchor[:3, 3] + self._state.T_base_anchor[:3, :3] @ (
-            np.array([*self._state.mean[:2], 1.0]) / self._state.mean[2]
+        state, settings = self._state, self._settings
+        prior = DistanceSettings(settings.initial_distance_m, settings.initial_relative_std)
+        if state is None or self._last is None:
+            return _described(None, T_base_cam, seen, prior)
+        point = DistanceState(state.T_base_anchor, state.mean[:3], state.cov[:3, :3], state.nis)
+        now = calibrating_filter.distance_at(state, replace(self._last, T_base_cam=T_base_cam))
+        return replace(
+            _described(point, T_base_cam, seen, prior),
+            distance_m=now.robot,
+            distance_std_m=now.robot_std,
+            lens=(now.lens, now.lens_std),
         )
-        centroid = transform(inverse(self._last.T_base_cam), point)
-        centroid = centroid[:2] / max(float(centroid[2]), 1e-3)
-        state = pose_filter.restart(centroid, self._last.T_base_cam, now.robot, now.robot_std, self._settings)
-        return _described(state, T_base_cam, seen, self._settings)
+
+
+def _sighting(frame: Frame) -> Sighting:
+    """A frame as the calibrating filter takes it."""
+    seen = frame.segmentation
+    stds = [ROBOT.arm.position_std] * 3 + [ROBOT.arm.rotation_std] * 3
+    pose_cov = np.diag(np.square(stds)) if frame.rig is None else frame.rig.pose_cov
+    if not seen.visible:
+        return Sighting(frame.T_base_cam, pose_cov, frame.camera_twist, None)
+    return Sighting(frame.T_base_cam, pose_cov, frame.camera_twist, seen.centroid, math.sqrt(mean_variance(seen)))

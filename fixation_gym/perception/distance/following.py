@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from fixation_gym.perception.distance import fixation_constraint
 from fixation_gym.perception.distance import pose_filter as distance
 from fixation_gym.perception.distance.covering import slide
 from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze, ConstraintSettings
+from fixation_gym.perception.distance.flow_filters import FlowSamples
+from fixation_gym.perception.distance.flow_samples import FlowName
 from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState
 from fixation_gym.perception.distance.target_motion import InverseDepth
 from fixation_gym.perception.scratch import Float32Array
@@ -20,6 +23,18 @@ from fixation_gym.types import FloatArray
 
 _COVERING = 0.05
 """Something covers or uncovers the target if its centroid may slide by this share of its size in a frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigMeasurement:
+    """What a rig knows of a frame besides: its noise in the arm's posture, and flow that was sampled in advance."""
+
+    pose_cov: FloatArray
+    """Covariance of the pose's noise [translation, rotation vector] in ``cam``, shape (6, 6)."""
+    twist_cov: FloatArray
+    """Covariance of the measured twist, shape (6, 6)."""
+    flow: Mapping[FlowName, FlowSamples] | None
+    """Flow on the target at the time of the frame before, by several methods; None where there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +51,8 @@ class Frame:
     """Measured twist [v, w] in ``cam``, shape (6,), m/s and rad/s."""
     segmentation: Segmentation
     """Target in the image."""
+    rig: RigMeasurement | None = None
+    """What a rig knows besides; None on a robot."""
 
 
 def follow_poses(

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fixation_gym.perception.distance.inverse_depth import MIN_DEPTH_M, correction, product, projection, view_rows
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 _REFERENCE_FOCAL_PX = 308.0
@@ -35,9 +36,9 @@ class DistanceSettings:
     """Part of the centroid noise that grows with the object, as a share of its standard deviation in the image."""
     border_std_size: float = 0.5
     """As ``centroid_std_size`` where the object touches the image border and its centroid is not the true one."""
-    position_std_m: float = 1e-4
+    position_std_m: float = ROBOT.arm.position_std
     """Noise of the camera position, m."""
-    rotation_std_rad: float = 2e-4
+    rotation_std_rad: float = ROBOT.arm.rotation_std
     """Noise of the camera orientation, rad."""
     walk_m: float = 5e-4
     """Random walk of the object while it is seen, m per square root of a second."""
@@ -74,7 +75,7 @@ class DistanceState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fixation:
-    """What is known about the fixated object now. Never NaN."""
+    """What is known about the fixated object now. Never NaN, but for ``nis``."""
 
     visible: bool
     """Whether the object was seen in this frame."""
@@ -87,9 +88,11 @@ class Fixation:
     distance_std_m: float
     """Its standard deviation, m; positive and finite."""
     nis: float
-    """Normalised innovation squared of the last centroid."""
+    """Normalised innovation squared of the last measurement, as of 2 degrees of freedom; NaN if there was none."""
     initialised: bool
     """False until the object was seen once; then the point is only the prior guess on the optical axis."""
+    lens: tuple[float, float] | None = None
+    """Depth from the true camera and its standard deviation, m, if an estimator tells that from the believed one."""
 
 
 def initialise(

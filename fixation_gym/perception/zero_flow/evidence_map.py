@@ -9,6 +9,7 @@ import numpy as np
 from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.perception.zero_flow import pixel_kernels
 from fixation_gym.perception.zero_flow.front_rule import FrontRule, exact_rule
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import ImageArray, MaskArray
 
 CELLS = 32
@@ -32,9 +33,9 @@ class ZeroFlowSettings:
     max_fixation_std: float = 0.15
     """While the fixated inverse depth is known to less than this share, only pixels that are decided all the same have
     evidence."""
-    position_std_m: float = 1e-4
+    position_std_m: float = ROBOT.arm.position_std
     """Noise of each camera position, m."""
-    rotation_std_rad: float = 2e-4
+    rotation_std_rad: float = ROBOT.arm.rotation_std
     """Noise of each camera orientation, rad."""
     moving_gate: float = 15.0
     """Motion across the epipolar line is independent above this chi-square (1 degree of freedom; 99.99 %)."""
