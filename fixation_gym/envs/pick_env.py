@@ -53,9 +53,9 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
     | ``time`` | (1,) | s since reset |
     | ``target_box`` | (4,) | which thing is the target: x, y, width, height in px of the first image, 0 out of it |
 
-    **Reward** ``"dense"``: potential-based progress, -0.004 per step, +10 on success, -5 for the first collision;
-    ``"sparse"``: +1 on success, -1 for the first collision. The terms, ``progress``, ``time``, ``success`` and
-    ``collision``, are in ``info["reward_terms"]`` and sum to the reward.
+    **Reward** ``"dense"``: potential-based progress, -0.004 per step, +10 on success, -5 for the first collision,
+    unless ``reward_weights`` say otherwise; ``"sparse"``: +1 on success, -1 for the first collision. The terms,
+    ``progress``, ``time``, ``success`` and ``collision``, are in ``info["reward_terms"]`` and sum to the reward.
 
     **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.50 m away,
     looking within 9 cm of it; of two red objects the target is the one nearer to the first image's centre.
@@ -80,6 +80,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         render_mode: str | None = None,
         render_view: str = "front",
         reward: str = "dense",
+        reward_weights: rewards.RewardWeights | Mapping[str, float] | None = None,
     ) -> None:
         """Check the arguments; the simulation itself is built at the first reset.
 
@@ -92,6 +93,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             render_view: of "rgb_array": "wrist", "front" or "overlay" (both, annotated with the ``percept`` that who
                 acts has given to this environment).
             reward: "dense" or "sparse".
+            reward_weights: of the dense reward: ``rewards.RewardWeights``, or a mapping with some of them; None for the
+                defaults.
 
         Raises:
             ValueError: for a value that is not allowed; the message says what is.
@@ -105,13 +108,12 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         require_choice("render_view", render_view, RENDER_VIEWS)
         if self._image_size is None and render_view == "overlay":
             raise ValueError('render_view="overlay" shows what perception sees, so it needs an image_size')
-        require_choice("reward", reward, rewards.REWARDS)
         self.render_mode, self.render_view = render_mode, render_view
         self.metadata = self.metadata | {"render_fps": control_frequency}
         self.intrinsics = Intrinsics.from_fovy(*(self._image_size or config.IMAGE_SIZE), ROBOT.camera.fovy)
         self.hand_eye = ROBOT.camera.hand_eye
         self.control_frequency = control_frequency
-        self._reward_terms = rewards.dense_terms if reward == "dense" else rewards.sparse_terms
+        self._reward_terms = rewards.choose_terms(reward, reward_weights)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
         self.observation_space = observation_space(self._image_size)
         boxes = ((key, box) for key, box in self.observation_space.items() if isinstance(box, spaces.Box))
@@ -175,18 +177,19 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         if self.render_mode is None:
             gym.logger.warn('render() needs render_mode="rgb_array" or "human" in gym.make')
             return None
-        if self.render_mode == "human":
-            self._show()
-            return None
         qpos = self.sim.data.qpos
-        if self.render_view == "wrist":
-            return self._image("wrist", qpos)
-        front = self._image("front", qpos)
-        if self.render_view == "front":
-            return front
+        if self.render_mode == "human":
+            if self._window is None:
+                from fixation_gym.envs.rendering import Window
+
+                self._window = Window(self.sim.display_model)
+            self._window.show(qpos)
+            return None
+        if self.render_view != "overlay":
+            return self._image(self.render_view, qpos)
         scale = _FRONT_SIZE[0] / self.intrinsics.height
         wrist = draw_overlay(self._last_rgb, self.percept, scale=scale)
-        return np.ascontiguousarray(np.hstack([wrist, front]))
+        return np.ascontiguousarray(np.hstack([wrist, self._image("front", qpos)]))
 
     def close(self) -> None:
         """Free GL contexts, windows and the simulation; may be called twice. A reset would build them anew."""
@@ -274,19 +277,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
         return self._views[view].render(qpos, with_reflections=mirror)
 
-    def _show(self) -> None:
-        """Update the window, opening it at first use."""
-        if self._window is None:
-            from fixation_gym.envs.rendering import Window
-
-            self._window = Window(self.sim.display_model)
-        self._window.show(self.sim.data.qpos)
-
     def _task_state(self) -> rewards.TaskState:
-        sim = self.sim
-        distance = math.dist(sim.body_position("target"), sim.tool_position())
+        distance = math.dist(self.sim.body_position("target"), self.sim.tool_position())
         held = self._steps_lifted >= config.HOLD_SECONDS * self.control_frequency
-        return rewards.TaskState(distance, sim.target_rise(), held, self._collided)
+        return rewards.TaskState(distance, self.sim.target_rise(), held, self._collided)
 
     def _info(self, terms: dict[str, float]) -> dict[str, Any]:
         pose = self._arm.camera_pose
