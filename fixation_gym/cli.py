@@ -1,6 +1,7 @@
 """The command line. Each command is a dataclass: its fields are the options, ``run`` does the work.
 
-Heavy modules are imported in ``run``, so that help and errors come at once.
+A command that runs what a config describes inherits its fields, with their defaults and help texts. Heavy modules are
+imported in ``run``, so that help and errors come at once.
 """
 
 from __future__ import annotations
@@ -18,9 +19,13 @@ from typing import Annotated, Protocol
 import tyro
 
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.experiments.distance.config import DistanceConfig
+from fixation_gym.experiments.scenarios.config import ScenariosConfig
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train
-from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, print_different, split_names
+from fixation_gym.names import Names
+from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, print_different
 
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 """What a disk that is full or broken says."""
@@ -40,7 +45,7 @@ class Demo:
 
     policy: str = "servo"
     """Policy to film."""
-    scenario: str = "clear,opaque,translucent,mirror"
+    scenario: Names = EvaluationConfig.scenarios
     """Scenario names, separated by commas."""
     episodes: int = 1
     """Episodes per scenario."""
@@ -51,9 +56,7 @@ class Demo:
 
     def run(self) -> int:
         """Film and print the table."""
-        from fixation_gym.evaluation.evaluate import EvaluationConfig
-
-        config = EvaluationConfig(self.policy, split_names(self.scenario), self.episodes, self.seed)
+        config = EvaluationConfig(self.policy, scenarios=self.scenario, episodes=self.episodes, seed=self.seed)
         config.check()
         select_backend()
         from fixation_gym.evaluation.demo import SHEET_FILE, VIDEO_FILE, run_demo
@@ -66,29 +69,9 @@ class Demo:
 
 
 @dataclass(frozen=True)
-class Evaluate:
+class Evaluate(EvaluationConfig):
     """Evaluate a policy over scenarios and seeds. The same command again resumes a run that was killed."""
 
-    policy: str = "servo"
-    """servo, blind, random, oracle, a variant of the servo, such as servo:no_retry, the path of an agent's zip, or
-    module:Class of your own."""
-    detector: str | None = None
-    """Finds the target for policies that look: colour, mean_shift, box (what the first box shows), or module:Class of
-    your own; by default colour, and box in any_colour."""
-    scenario: str = "clear,opaque,translucent,mirror"
-    """Scenario names, separated by commas."""
-    episodes: int = 20
-    """Episodes per scenario."""
-    seed: int = 0
-    """Chooses the block of episode seeds: episode i has seed 100000 * SEED + i in every scenario."""
-    sensor_noise: str = "nominal"
-    """ideal, nominal or conservative."""
-    image_size: tuple[int, int] | None = None
-    """Height and width of the wrist image, px; 240 320 by default, for an agent those of its training."""
-    workers: int = 1
-    """Number of processes."""
-    backend: str = "loky"
-    """Where the processes run: loky (this machine) or ray (a Ray cluster)."""
     film_failures: bool = False
     """Run every failed episode again, and keep six moments of it as a picture in the folder clips."""
     out: Path = Path("out/evaluate")
@@ -96,27 +79,13 @@ class Evaluate:
 
     def run(self) -> int:
         """Evaluate and print the table."""
-        from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
-        from policies.catalogue import check_policy, surroundings
-
-        check_policy(self.policy)
-        config = EvaluationConfig(
-            policy=self.policy,
-            detector=self.detector,
-            scenarios=split_names(self.scenario),
-            episodes=self.episodes,
-            seed=self.seed,
-            sensor_noise=self.sensor_noise,
-            image_size=self.image_size or surroundings(self.policy).image_size,
-            workers=self.workers,
-            backend=self.backend,
-        )
-        config.check()
+        self.check()
         select_backend()
+        from fixation_gym.evaluation.evaluate import evaluate
         from fixation_gym.evaluation.report import format_table
         from fixation_gym.evaluation.storage import SUMMARY_FILE
 
-        summary = evaluate(config, self.out)
+        summary = evaluate(self, self.out)
         if self.film_failures:
             from fixation_gym.evaluation.clips import film_failures
 
@@ -127,68 +96,41 @@ class Evaluate:
 
 
 @dataclass(frozen=True)
-class Distance:
+class Distance(DistanceConfig):
     """Error of the distance against distance, fixating and only translating. The same command again resumes."""
 
-    quick: bool = False
-    """Six distances and two seeds instead of thirteen and twenty."""
-    seeds: int | None = None
-    """Sequences per distance, amplitude and motion; 20 by default, 2 with --quick."""
-    seed: int = 0
-    """Chooses the block of seeds: sequence i has seed 100000 * SEED + i."""
-    noise: str = "conservative"
-    """Sensor noise: ideal, nominal or conservative."""
-    workers: int = 1
-    """Number of processes."""
     out: Path = Path("out/distance")
     """Folder of the results."""
 
     def run(self) -> int:
         """Measure and print the table."""
-        from fixation_gym.experiments.distance.run import CSV_FILE, FIGURE_FILE, DistanceConfig, measure
-
-        config = DistanceConfig(self.quick, self.seeds, self.seed, self.noise, self.workers)
-        config.check()
+        self.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.distance.run import CSV_FILE, FIGURE_FILE, measure
         from fixation_gym.experiments.distance.statistics import format_table
 
-        summary = measure(config, self.out)
-        print(format_table(summary))
+        print(format_table(measure(self, self.out)))
         print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, FIGURE_FILE)))
         return 0
 
 
 @dataclass(frozen=True)
-class Scenarios:
+class Scenarios(ScenariosConfig):
     """What is in front of the fixated object, in four hard scenes. The same command again resumes."""
 
-    quick: bool = False
-    """Three instances of every scene and variant instead of twenty."""
-    instances: int | None = None
-    """Random instances of every scene and variant; 20 by default, 3 with --quick."""
-    seed: int = 0
-    """Chooses the block of seeds: instance i has seed 100000 * SEED + i."""
-    noise: str = "nominal"
-    """Sensor noise: ideal, nominal or conservative."""
-    workers: int = 1
-    """Number of processes."""
-    film: bool = True
-    """Make figure and videos."""
     out: Path = Path("out/scenarios")
     """Folder of the results."""
 
     def run(self) -> int:
         """Look and print the table."""
-        from fixation_gym.experiments.scenarios.run import CSV_FILE, FIGURE_FILE, VIDEO_FILES, ScenariosConfig, measure
-
-        config = ScenariosConfig(self.quick, self.instances, self.seed, self.noise, self.workers, self.film)
-        config.check()
+        self.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.scenarios.run import CSV_FILE, FIGURE_FILE, VIDEO_FILES, measure
         from fixation_gym.experiments.scenarios.statistics import format_table
 
-        print(format_table(measure(config, self.out)))
+        print(format_table(measure(self, self.out)))
         pictures = (FIGURE_FILE, *VIDEO_FILES.values()) if self.film else ()
         print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, *pictures)))
         return 0
@@ -271,6 +213,7 @@ def parse(argv: Sequence[str] | None) -> Command:
                 prog="fixation-gym",
                 description="Gaze fixation for robots: distance and obstacles from one's own motion.",
                 args=None if argv is None else list(argv),
+                config=(tyro.conf.SuppressFixed,),
             )
     except SystemExit as exit_:
         if exit_.code in (None, 0):

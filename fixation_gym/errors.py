@@ -10,12 +10,12 @@ class UsageError(ValueError):
 
 
 def check_names(names: Iterable[str], valid: Iterable[str], what: str) -> None:
-    """Check that all names are known.
+    """Check that there are names, and that all are known.
 
     Raises:
-        UsageError: naming the first unknown name, and all valid ones in their own order.
+        UsageError: naming the first unknown name, empty if there is none, and all valid ones in their own order.
     """
     valid = tuple(valid)
-    for name in names:
+    for name in tuple(names) or ("",):
         if name not in valid:
             raise UsageError(f"unknown {what} '{name}'; choose one of {', '.join(valid)}")

@@ -6,35 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fixation_gym.gl import select_backend
-from fixation_gym.report_commands import split_names
+from fixation_gym.names import Names
+from policies.rl.config import TrainConfig, require_learning_packages
 
 
 @dataclass(frozen=True)
-class Train:
+class Train(TrainConfig):
     """Train an agent on FixationPickZFC-v0 with Stable-Baselines3; a run that was killed goes on with --resume."""
 
-    config: str = "zfc"
-    """What the learner sees: zfc (zero-flow map), blind (no map), rgb (image), privileged (true map), or residual: the
-    map, to add to the servo's lateral velocity."""
-    algorithm: str = "sac"
-    """sac or ppo."""
-    scenario: str = "mixed"
-    """Name of the scenario to train on."""
-    steps: int = 8_000
-    """Decisions to learn from; 5 per simulated second, and a whole grasp counts as one. SAC begins with 1000 random
-    ones."""
-    seed: int = 0
-    """Chooses scenes and initial weights."""
-    workers: int = 4
-    """Number of processes that step environments; more than cores is good, since grasps take long."""
-    sensor_noise: str = "nominal"
-    """ideal, nominal or conservative."""
-    eval_every: int = 2_000
-    """Decisions between evaluations."""
-    eval_episodes: int = 32
-    """Episodes of each evaluation."""
-    checkpoint_minutes: float = 5.0
-    """Minutes between checkpoints."""
     resume: bool = False
     """Go on with the run in the folder."""
     out: Path = Path("out/train")
@@ -42,26 +21,12 @@ class Train:
 
     def run(self) -> int:
         """Train and print where the agents are."""
-        from policies.rl.config import TrainConfig
-
-        config = TrainConfig(
-            config=self.config,
-            algorithm=self.algorithm,
-            scenario=self.scenario,
-            steps=self.steps,
-            seed=self.seed,
-            workers=self.workers,
-            sensor_noise=self.sensor_noise,
-            eval_every=self.eval_every,
-            eval_episodes=self.eval_episodes,
-            checkpoint_minutes=self.checkpoint_minutes,
-        )
-        config.check()
+        self.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
         from policies.rl.train import BEST_FILE, FINAL_FILE, train
 
-        summary = train(config, self.out, self.resume)
+        summary = train(self, self.out, self.resume)
         rates = summary["final"]
         print(
             f"\nafter {summary['decisions']} decisions, {summary['env_steps']} control steps, "
@@ -76,7 +41,7 @@ class Train:
 class Compare:
     """Train and test configurations over seeds: learning curves, final table. The same command again resumes."""
 
-    config: str = "zfc,blind,rgb,residual"
+    config: Names = ("zfc", "blind", "rgb", "residual")
     """Configurations, separated by commas; the others are compared with the first, seed by seed."""
     seeds: int = 5
     """Training seeds of every configuration, from 0 on."""
@@ -84,7 +49,7 @@ class Compare:
     """Decisions of every training run; the first 1000 are random."""
     scenario: str = "mixed"
     """Scenario to train on."""
-    test: str = ""
+    test: Names = ()
     """Scenarios to test on, separated by commas; if none, the one that is trained on. The servo is tested, too."""
     episodes: int = 50
     """Episodes per test scenario and agent; the same for all."""
@@ -102,8 +67,6 @@ class Compare:
 
     def run(self) -> int:
         """Compare and print the table."""
-        from policies.rl.config import TrainConfig, require_learning_packages
-
         require_learning_packages()
         from policies.rl.compare import QUICK, CompareConfig, compare
         from policies.rl.comparison_tables import (
@@ -117,10 +80,10 @@ class Compare:
 
         training = QUICK if self.quick else TrainConfig(steps=self.steps)
         config = CompareConfig(
-            configs=("zfc", "blind") if self.quick else split_names(self.config),
+            configs=("zfc", "blind") if self.quick else self.config,
             seeds=2 if self.quick else self.seeds,
             training=replace(training, scenario=self.scenario, workers=self.env_workers),
-            scenarios=split_names(self.test or self.scenario),
+            scenarios=self.test or (self.scenario,),
             episodes=8 if self.quick else self.episodes,
             workers=self.workers,
             backend=self.backend,

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 import tyro
 
 from fixation_gym.errors import check_names
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.experiments.necessity.config import NecessityConfig
 from fixation_gym.gl import select_backend
+from fixation_gym.names import Names
 
 if TYPE_CHECKING:
     from fixation_gym.evaluation.rollout import EpisodeResult
@@ -20,9 +23,9 @@ if TYPE_CHECKING:
 class Ablate:
     """Evaluate the servo and variants that leave something out on the same episodes, and write their report."""
 
-    variant: str = ""
+    variant: Names = ()
     """Names of variants, separated by commas; all by default. The full servo always runs."""
-    scenario: str = "clear,opaque,translucent,mirror"
+    scenario: Names = EvaluationConfig.scenarios
     """Scenario names, separated by commas."""
     episodes: int = 20
     """Episodes per scenario and variant."""
@@ -43,13 +46,12 @@ class Ablate:
 
     def run(self) -> int:
         """Evaluate and print the table."""
-        from fixation_gym.evaluation.evaluate import EvaluationConfig
         from policies.servo.variants import VARIANT_NAMES, VARIANTS
 
-        names = split_names(self.variant) if self.variant else VARIANT_NAMES
+        names = self.variant or VARIANT_NAMES
         check_names(names, VARIANT_NAMES, "variant")
         config = EvaluationConfig(
-            scenarios=split_names(self.scenario),
+            scenarios=self.scenario,
             episodes=self.episodes,
             seed=self.seed,
             sensor_noise=self.sensor_noise,
@@ -73,7 +75,7 @@ class Ablate:
 class Ladder:
     """From the paper's algorithm to the servo, one change at a time, on the same episodes; what each change buys."""
 
-    scenario: str = ""
+    scenario: Names = ()
     """Scenario names, separated by commas; by default all in which the target is red."""
     episodes: int = 20
     """Episodes per scenario and policy."""
@@ -89,12 +91,11 @@ class Ladder:
     def run(self) -> int:
         """Evaluate and print the table."""
         from fixation_gym.envs.config import SCENARIOS
-        from fixation_gym.evaluation.evaluate import EvaluationConfig
         from policies.ladder import BESIDE, LADDER
 
         red = tuple(name for name, item in SCENARIOS.items() if not item.any_colour)
         config = EvaluationConfig(
-            scenarios=split_names(self.scenario) if self.scenario else red,
+            scenarios=self.scenario or red,
             episodes=self.episodes,
             seed=self.seed,
             workers=self.workers,
@@ -110,41 +111,21 @@ class Ladder:
 
 
 @dataclass(frozen=True)
-class Necessity:
+class Necessity(NecessityConfig):
     """The best fixed blind way of every scenario: must obstacles be seen? The same command again resumes."""
 
-    scenario: str = ""
-    """Scenario names, separated by commas; by default all with obstacles, with --quick three of them."""
-    quick: bool = False
-    """A few ways and four episodes: minutes, to see that everything works."""
-    episodes: int | None = None
-    """Episodes per scenario, an even number, half to choose the best way and half to judge it; 40 by default, 4 with
-    --quick."""
-    seed: int = 0
-    """Chooses the block of episode seeds, as for evaluate."""
-    agent: Path | None = None
-    """An agent's zip, such as a trained blind one, to put beside the ways."""
-    evaluation: Path | None = None
-    """A folder that evaluate wrote with the same --seed, such as the servo's, to be paired with the best ways."""
-    workers: int = 1
-    """Number of processes."""
     out: Path = Path("out/necessity")
     """Folder of the results."""
 
     def run(self) -> int:
         """Try the ways and print the table."""
-        from fixation_gym.experiments.necessity.run import FIGURE_FILE, ROWS_FILE, TABLE_FILE, NecessityConfig, measure
-
-        scenarios = split_names(self.scenario) if self.scenario else None
-        config = NecessityConfig(
-            scenarios, self.quick, self.episodes, self.seed, self.agent, self.evaluation, self.workers
-        )
-        config.check()
+        self.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.necessity.run import FIGURE_FILE, ROWS_FILE, TABLE_FILE, measure
         from fixation_gym.experiments.necessity.statistics import format_table
 
-        print(format_table(measure(config, self.out)["table"]))
+        print(format_table(measure(self, self.out)["table"]))
         print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, TABLE_FILE, ROWS_FILE, FIGURE_FILE)))
         return 0
 
@@ -169,11 +150,6 @@ class Report:
         write_report(self.folders, self.out, self.gallery, self.title)
         print(self.out / REPORT_FILE)
         return 0
-
-
-def split_names(text: str) -> tuple[str, ...]:
-    """Split "a,b" into ("a", "b")."""
-    return tuple(name.strip() for name in text.split(","))
 
 
 def print_different(results: Sequence[EpisodeResult]) -> None:

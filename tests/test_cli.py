@@ -10,9 +10,11 @@ from typing import Any
 
 import pytest
 
-from fixation_gym import cli, doctor, gl, report_commands
+from fixation_gym import cli, doctor, gl, learning_commands, report_commands
 from fixation_gym.evaluation import clips, demo, evaluate
+from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.reporting import ablation
+from policies.rl.config import TrainConfig
 
 
 @pytest.fixture(autouse=True)
@@ -91,9 +93,9 @@ def test_a_missing_gl_library_is_one_line_and_leaves_no_folder(
 def test_evaluate_passes_its_options_on_and_prints_the_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen: list[evaluate.EvaluationConfig] = []
+    seen: list[EvaluationConfig] = []
 
-    def fake_evaluate(config: evaluate.EvaluationConfig, out: Path) -> dict[str, Any]:
+    def fake_evaluate(config: EvaluationConfig, out: Path) -> dict[str, Any]:
         seen.append(config)
         return evaluate.summary_of(config, [], 0.0)
 
@@ -101,8 +103,14 @@ def test_evaluate_passes_its_options_on_and_prints_the_table(
     options = "--policy blind --scenario clear,mirror --episodes 7 --seed 3 --workers 2 --image-size 120 160"
     assert cli.main(["evaluate", *options.split(), "--out", str(tmp_path)]) == 0
     assert seen == [
-        evaluate.EvaluationConfig(
-            policy="blind", scenarios=("clear", "mirror"), episodes=7, seed=3, workers=2, image_size=(120, 160)
+        cli.Evaluate(
+            policy="blind",
+            scenarios=("clear", "mirror"),
+            episodes=7,
+            seed=3,
+            workers=2,
+            image_size=(120, 160),
+            out=tmp_path,
         )
     ]
     assert capsys.readouterr().out.startswith("scenario")
@@ -130,7 +138,7 @@ def test_ablate_always_runs_the_full_servo_first(
 ) -> None:
     seen: list[tuple[str, ...]] = []
 
-    def fake_ablate(config: evaluate.EvaluationConfig, variants: tuple[str, ...], *rest: Any) -> Any:
+    def fake_ablate(config: EvaluationConfig, variants: tuple[str, ...], *rest: Any) -> Any:
         seen.append(variants)
         return {"policies": {}, "success_differences": []}, []
 
@@ -162,10 +170,18 @@ def test_a_report_of_nothing_is_one_line_and_leaves_no_folder(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_training_run_is_what_its_config_says_and_the_rest_of_the_config_is_no_option(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert learning_commands.Train(resume=True, out=Path("elsewhere")).identity() == TrainConfig().identity()
+    assert cli.main(["train", "--buffer-size", "9"]) == 2
+    assert "Unrecognized options: --buffer-size" in error_line(capsys)
+
+
 def test_demo_films_four_scenarios_by_default(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fake_demo(config: evaluate.EvaluationConfig, out: Path) -> dict[str, Any]:
+    def fake_demo(config: EvaluationConfig, out: Path) -> dict[str, Any]:
         assert (config.policy, config.scenarios) == ("servo", ("clear", "opaque", "translucent", "mirror"))
         return evaluate.summary_of(config, [], 0.0)
 

@@ -14,7 +14,8 @@ from tqdm import tqdm
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.evaluate import EvaluationConfig, summary_of
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import summary_of
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.rollout import EpisodeResult, run_episode
 from fixation_gym.evaluation.storage import (

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.config import SEED_BLOCK
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders

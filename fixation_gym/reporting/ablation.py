@@ -9,7 +9,8 @@ from typing import Any
 
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.clips import film_failures
-from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import evaluate
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.storage import make_folder
 from fixation_gym.reporting.report import check_report_folder, write_report

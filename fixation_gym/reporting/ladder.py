@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.evaluate import EvaluationConfig
+from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.files import write_csv, write_file
 from fixation_gym.evaluation.folders import read_evaluation
 from fixation_gym.evaluation.rollout import EpisodeResult

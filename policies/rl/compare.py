@@ -11,7 +11,8 @@ from typing import Any
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import evaluate
 from fixation_gym.evaluation.files import write_csv, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
@@ -62,13 +63,13 @@ class CompareConfig:
             UsageError: naming the first bad value and what is allowed.
         """
         check_names(self.configs, CONFIGS, "configuration")
-        if not self.configs or len(set(self.configs)) < len(self.configs):
+        if len(set(self.configs)) < len(self.configs):
             raise UsageError(f"--config must name one or more different ones, got {','.join(self.configs)!r}")
         if not 1 <= self.seeds <= 1000:
             raise UsageError(f"--seeds must be within 1..1000, got {self.seeds}")
         self.training.check()
         workers.check_backend(self.backend, self.workers)
-        EvaluationConfig(SERVO, self.scenarios, self.episodes, TEST_SEED).check()
+        EvaluationConfig(SERVO, scenarios=self.scenarios, episodes=self.episodes, seed=TEST_SEED).check()
 
     def cells(self, out: Path) -> dict[CellKey, workers.Cell]:
         """All runs, and the servo's test."""
@@ -107,9 +108,9 @@ def run_cell(cell: workers.Cell) -> dict[str, Any]:
         policy, image_size = str(folder / FINAL_FILE), tuple(cell["training"]["image_size"])
     test = EvaluationConfig(
         policy,
-        tuple(cell["scenarios"]),
-        cell["episodes"],
-        TEST_SEED,
+        scenarios=tuple(cell["scenarios"]),
+        episodes=cell["episodes"],
+        seed=TEST_SEED,
         image_size=image_size,
         workers=cell["processes"],
     )

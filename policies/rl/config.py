@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
+
+from tyro.conf import Fixed
 
 from fixation_gym.errors import UsageError, check_names
 
@@ -26,31 +28,37 @@ VALIDATION_SEEDS = 1_900_000_000
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """One training run. A step is a decision of the learner."""
+    """One training run. A step is a decision of the learner. Fields that are ``Fixed`` are no options of ``train``."""
 
     config: str = "zfc"
-    """Name of a configuration."""
+    """What the learner sees: zfc (zero-flow map), blind (no map), rgb (image), privileged (true map), or residual: the
+    map, to add to the servo's lateral velocity."""
     algorithm: str = "sac"
+    """sac or ppo."""
     scenario: str = "mixed"
+    """Name of the scenario to train on."""
     steps: int = 8_000
-    """Decisions to learn from, of all worker processes together."""
+    """Decisions to learn from; 5 per simulated second, and a whole grasp counts as one. SAC begins with 1000 random
+    ones."""
     seed: int = 0
+    """Chooses scenes and initial weights."""
     workers: int = 4
-    """Processes that step environments. More than cores: a grasp is one long step, and the others fill the wait."""
+    """Number of processes that step environments; more than cores is good, since grasps take long."""
     sensor_noise: str = "nominal"
-    image_size: tuple[int, int] = (96, 128)
+    """ideal, nominal or conservative."""
+    image_size: Fixed[tuple[int, int]] = (96, 128)
     """Height and width of the wrist image, px; the map's cells lie as those of 240x320."""
     eval_every: int = 2_000
     """Decisions between evaluations."""
     eval_episodes: int = 32
     """Episodes of each evaluation, always the same ones."""
     checkpoint_minutes: float = 5.0
-    """Time between checkpoints; another follows every evaluation."""
-    learning_starts: int = 1_000
+    """Minutes between checkpoints; another follows every evaluation."""
+    learning_starts: Fixed[int] = 1_000
     """SAC: random decisions before learning begins."""
-    gradient_steps: int = 1
+    gradient_steps: Fixed[int] = 1
     """SAC: per decision."""
-    buffer_size: int = 50_000
+    buffer_size: Fixed[int] = 50_000
     """SAC: decisions kept."""
 
     @property
@@ -94,9 +102,9 @@ class TrainConfig:
 
         The number of workers may not, since a replay buffer has a column for each.
         """
-        values = asdict(self)
-        for name in ("steps", "eval_every", "checkpoint_minutes"):
-            del values[name]
+        may_change = ("steps", "eval_every", "checkpoint_minutes")
+        names = [field.name for field in fields(TrainConfig) if field.name not in may_change]
+        values = {name: getattr(self, name) for name in names}
         return {**values, "image_size": list(self.image_size)}
 
 

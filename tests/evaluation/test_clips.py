@@ -12,7 +12,8 @@ from made_traces import make_trace
 
 from fixation_gym.evaluation import clips, workers
 from fixation_gym.evaluation.clips import clip_file, film_failures, moments
-from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import evaluate
 from fixation_gym.evaluation.rollout import run_episode
 
 CONFIG = EvaluationConfig(scenarios=("clear",), episodes=4)

@@ -15,7 +15,7 @@ from evaluation_fakes import FakeEnv, FakePolicy
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation import demo, video, workers
-from fixation_gym.evaluation.evaluate import EvaluationConfig
+from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.storage import EpisodeStore
 
 CONFIG = EvaluationConfig(scenarios=("clear", "mirror"), episodes=2)

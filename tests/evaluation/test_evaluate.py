@@ -10,7 +10,8 @@ from evaluation_fakes import run_fake_cell
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.evaluate import EvaluationConfig, episode_seeds, evaluate, seed_hash
+from fixation_gym.evaluation.config import EvaluationConfig, episode_seeds
+from fixation_gym.evaluation.evaluate import evaluate, seed_hash
 from fixation_gym.evaluation.report import format_table
 from fixation_gym.evaluation.storage import EPISODES_FILE
 
@@ -123,6 +124,18 @@ def test_the_table_has_a_row_per_scenario(tmp_path: Path) -> None:
 def test_a_bad_value_is_an_error_that_says_what_is_allowed(config: EvaluationConfig, message: str) -> None:
     with pytest.raises(UsageError, match=message):
         config.check()
+
+
+@pytest.mark.parametrize(
+    ("policy", "asked", "size"),
+    [("servo", None, [240, 320]), ("policies/agents/zfc.zip", None, [96, 128]), ("servo", (64, 80), [64, 80])],
+)
+def test_the_image_has_the_size_that_is_asked_for_or_the_policys_own(
+    policy: str, asked: tuple[int, int] | None, size: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2])
+    config = EvaluationConfig(policy, image_size=asked)
+    assert config.cell(("clear", 0))["image_size"] == config.run_description()["image_size"] == size
 
 
 def test_ray_is_an_error_where_it_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:

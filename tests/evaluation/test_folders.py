@@ -10,7 +10,8 @@ import pytest
 from evaluation_fakes import run_fake_cell
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate, seed_hash
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import evaluate, seed_hash
 from fixation_gym.evaluation.folders import evaluation_folders, read_evaluation
 
 CONFIG = EvaluationConfig(scenarios=("opaque", "clear"), episodes=2)

@@ -10,7 +10,8 @@ from evaluation_fakes import FakeEnv, FakePolicy, SilentPolicy, run_fake_cell
 from made_traces import make_trace
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.evaluate import EvaluationConfig, evaluate
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import evaluate
 from fixation_gym.evaluation.rollout import run_episode
 from fixation_gym.evaluation.storage import EPISODES_FILE, EpisodeStore
 from fixation_gym.evaluation.trace import TRACES_FOLDER, read_trace, trace_file, write_trace

@@ -14,13 +14,12 @@ from fixation_gym import cli
 from fixation_gym.errors import UsageError
 from fixation_gym.experiments.distance import figure as distance_figure
 from fixation_gym.experiments.distance import run as distance
+from fixation_gym.experiments.distance.config import DISTANCES, DistanceConfig
 from fixation_gym.experiments.distance.duck_print import WIDTHS, card_image, duck_mask, valid_widths
 from fixation_gym.experiments.distance.run import (
     CSV_FILE,
-    DISTANCES,
     FIGURE_FILE,
     SEQUENCES_FILE,
-    DistanceConfig,
     cell_key,
     measure,
 )

@@ -24,16 +24,15 @@ from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.statistics import paired_difference_interval, wilson_interval
 from fixation_gym.experiments.necessity import run as necessity
+from fixation_gym.experiments.necessity.config import NecessityConfig, scenarios_with_obstacles
 from fixation_gym.experiments.necessity.episodes import Outcome, play_in
 from fixation_gym.experiments.necessity.run import (
     FIGURE_FILE,
     ROWS_FILE,
     TABLE_FILE,
-    NecessityConfig,
     cell_key,
     measure,
     run_cell,
-    scenarios_with_obstacles,
 )
 from fixation_gym.experiments.necessity.statistics import chosen_ways, format_table, summarise
 from fixation_gym.experiments.necessity.ways import ELEVATIONS, QUICK_WAYS, STRAIGHT, WAYS, azimuth_cells

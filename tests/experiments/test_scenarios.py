@@ -12,8 +12,9 @@ import pytest
 from fixation_gym import cli
 from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.errors import UsageError
+from fixation_gym.experiments.scenarios.config import ScenariosConfig
 from fixation_gym.experiments.scenarios.rules import RULES, plane_front
-from fixation_gym.experiments.scenarios.run import CSV_FILE, RUNS_FILE, ScenariosConfig, cell_key, instance_rng, measure
+from fixation_gym.experiments.scenarios.run import CSV_FILE, RUNS_FILE, cell_key, instance_rng, measure
 from fixation_gym.experiments.scenarios.scenes import (
     CIRCLE_RADIUS,
     CIRCLE_RATE,

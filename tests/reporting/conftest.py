@@ -9,7 +9,8 @@ import pytest
 from evaluation_fakes import FakeEnv, FakePolicy
 from made_traces import make_trace
 
-from fixation_gym.evaluation.evaluate import EvaluationConfig, summary_of
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import summary_of
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.rollout import EpisodeResult, run_episode
 from fixation_gym.evaluation.storage import EpisodeStore
@@ -50,7 +51,7 @@ def write_evaluation(folder: Path, config: EvaluationConfig, results: list[Episo
 @pytest.fixture(scope="session")
 def servo_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Fails once, in mirror: it loses the target. Not to be written to."""
-    config = EvaluationConfig("servo", SCENARIOS, EPISODES)
+    config = EvaluationConfig("servo", scenarios=SCENARIOS, episodes=EPISODES)
     results = [episode("servo", *key, success=key != ("mirror", 1), hit=False) for key in config.episode_keys()]
     return write_evaluation(tmp_path_factory.mktemp("evaluations") / "servo", config, results)
 
@@ -58,7 +59,7 @@ def servo_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def blind_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Always picks in clear, collides in mirror, and picks there half the time. Not to be written to."""
-    config = EvaluationConfig("blind", SCENARIOS, EPISODES)
+    config = EvaluationConfig("blind", scenarios=SCENARIOS, episodes=EPISODES)
     keys = config.episode_keys()
     results = [
         episode("blind", *key, success=key[0] == "clear" or key[1] % 2 == 0, hit=key[0] == "mirror") for key in keys

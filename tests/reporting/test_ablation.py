@@ -8,7 +8,7 @@ import pytest
 from evaluation_fakes import run_fake_cell
 
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.evaluate import EvaluationConfig
+from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.reporting.ablation import ablate, format_ablations
 
 CONFIG = EvaluationConfig(scenarios=("clear",), episodes=2)

@@ -10,7 +10,7 @@ import pytest
 from evaluation_fakes import run_fake_cell
 
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.evaluate import EvaluationConfig
+from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.statistics import paired_difference_interval
 from fixation_gym.reporting.ladder import FIGURE_FILE, LADDER_FILE, climb, format_ladder
 from policies.catalogue import POLICY_NAMES

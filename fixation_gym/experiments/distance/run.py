@@ -3,80 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast, get_args
 
 import numpy as np
 
-from fixation_gym.evaluation.evaluate import SEED_BLOCK
 from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.workers import prepare_process
-from fixation_gym.experiments.distance.duck_print import valid_widths
+from fixation_gym.experiments.distance.config import DistanceConfig
 from fixation_gym.experiments.distance.sequence import INTRINSICS, Condition, Motion
 from fixation_gym.experiments.distance.statistics import summarise
-from fixation_gym.experiments.runner import Cell, Experiment, check_options, kept_rig
+from fixation_gym.experiments.runner import Cell, Experiment, kept_rig
 
-DISTANCES = (0.066, 0.097, 0.15, 0.21, 0.31, 0.45, 0.66, 0.97, 1.4, 2.0, 3.1, 4.5, 6.6)
-"""m, evenly spaced in the logarithm but for the paper's 0.15 and 2."""
-QUICK_DISTANCES = (0.066, 0.15, 0.31, 0.66, 2.0, 6.6)
-AMPLITUDES = (0.02, 0.05)
-"""Radii of the circle, m."""
-LARGE_AMPLITUDE_FROM = 0.15
-"""Nearest distance for the larger circle, m."""
 SEQUENCES_FILE, CSV_FILE, FIGURE_FILE = "sequences.jsonl", "rows.csv", "distance.png"
 
 Key = tuple[float, float, str, int]
 """(distance, amplitude, motion, seed)"""
-
-
-@dataclass(frozen=True)
-class DistanceConfig:
-    """What to measure, and with how many processes."""
-
-    quick: bool = False
-    """Fewer distances, two seeds, and one amplitude per distance: the largest."""
-    seeds: int | None = None
-    """Sequences per distance, amplitude and motion; None for 20, or 2 if quick."""
-    seed: int = 0
-    noise: str = "conservative"
-    workers: int = 1
-
-    def check(self) -> None:
-        """Check everything that can be checked without the simulator.
-
-        Raises:
-            UsageError: naming the first bad value and what is allowed.
-        """
-        check_options(self.noise, self.seed, self.seed_count, "--seeds", self.workers)
-
-    @property
-    def seed_count(self) -> int:
-        """Sequences per distance, amplitude and motion."""
-        return self.seeds if self.seeds is not None else 2 if self.quick else 20
-
-    def cells(self) -> list[Cell]:
-        """All sequences. A seed's conditions come before those of the next, so that part of a run shows the whole."""
-        cells = []
-        for index in range(self.seed_count):
-            for distance in QUICK_DISTANCES if self.quick else DISTANCES:
-                amplitudes = [a for a in AMPLITUDES if a == AMPLITUDES[0] or distance >= LARGE_AMPLITUDE_FROM]
-                for amplitude in amplitudes[-1:] if self.quick else amplitudes:
-                    for motion in get_args(Motion):
-                        cells.append(self._cell(distance, amplitude, motion, index))
-        return cells
-
-    def _cell(self, distance: float, amplitude: float, motion: Motion, index: int) -> Cell:
-        # Without rotation the print wanders through the image by the amplitude.
-        widths = valid_widths(distance, INTRINSICS, amplitude if motion == "translation" else 0.0)
-        return {
-            "distance_m": distance,
-            "amplitude_m": amplitude,
-            "motion": motion,
-            "print_width_m": widths[index % len(widths)],
-            "seed": self.seed * SEED_BLOCK + index,
-            "noise": self.noise,
-        }
 
 
 def cell_key(cell: Cell) -> Key:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fixation_gym.evaluation.evaluate import SEED_BLOCK
+from fixation_gym.evaluation.config import SEED_BLOCK
 from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.workers import prepare_process
-from fixation_gym.experiments.runner import Cell, Experiment, check_options, kept_rig
+from fixation_gym.experiments.runner import Cell, Experiment, kept_rig
+from fixation_gym.experiments.scenarios.config import Key, ScenariosConfig
 from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
 from fixation_gym.experiments.scenarios.statistics import rows_of, summarise
 
@@ -21,48 +21,6 @@ if TYPE_CHECKING:
 
 RUNS_FILE, CSV_FILE, FIGURE_FILE = "runs.jsonl", "rows.csv", "scenarios.png"
 VIDEO_FILES = {scene: f"{scene}.mp4" for scene in SCENES}
-
-Key = tuple[str, str, int]
-"""(scene, variant, seed)"""
-
-
-@dataclass(frozen=True)
-class ScenariosConfig:
-    """What to look at, and with how many processes."""
-
-    quick: bool = False
-    """Three instances instead of twenty."""
-    instances: int | None = None
-    """Random instances of every scene and variant, and of the clear scene; None for 20, or 3 if quick."""
-    seed: int = 0
-    noise: str = "nominal"
-    workers: int = 1
-    film: bool = True
-    """Whether to make figure and videos."""
-
-    def check(self) -> None:
-        """Check everything that can be checked without the simulator.
-
-        Raises:
-            UsageError: naming the first bad value and what is allowed.
-        """
-        check_options(self.noise, self.seed, self.instance_count, "--instances", self.workers)
-
-    @property
-    def instance_count(self) -> int:
-        """Random instances of every scene and variant."""
-        return self.instances if self.instances is not None else 3 if self.quick else 20
-
-    def cells(self) -> dict[Key, Cell]:
-        """All runs. A seed's scenes come before those of the next, so that part of a run shows the whole."""
-        cells = {}
-        for index in range(self.instance_count):
-            seed = self.seed * SEED_BLOCK + index
-            keys = [(scene, variant, seed) for scene in SCENES for variant in VARIANTS]
-            keys.append((CLEAR, VARIANTS[index % 2], seed))  # lateral and approaching in turn
-            for scene, variant, seed in keys:
-                cells[scene, variant, seed] = {"scene": scene, "variant": variant, "seed": seed, "noise": self.noise}
-        return cells
 
 
 def cell_key(cell: Cell) -> Key:

@@ -1,0 +1,122 @@
+"""What ``evaluate`` runs, as a value. Imports nothing heavy, so that the command line answers at once."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from fixation_gym.doctor import installed_versions
+from fixation_gym.errors import UsageError, check_names
+from fixation_gym.names import Names
+
+if TYPE_CHECKING:
+    from fixation_gym.evaluation.storage import EpisodeKey
+    from fixation_gym.evaluation.workers import Cell
+    from policies.catalogue import Surroundings
+
+SEED_BLOCK = 100_000
+"""Episode i of ``--seed S`` has seed S * SEED_BLOCK + i, in every scenario: policies meet the same scenes."""
+
+_IMAGE_SIZES = (32, 2048)
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """What to evaluate, and with how many processes."""
+
+    policy: str = "servo"
+    """servo, blind, random, oracle, a variant of the servo, such as servo:no_retry, the path of an agent's zip, or
+    module:Class of your own."""
+    detector: str | None = None
+    """Finds the target for policies that look: colour, mean_shift, box (what the first box shows), or module:Class of
+    your own; by default colour, and box in any_colour."""
+    scenarios: Annotated[Names, tyro.conf.arg(name="scenario")] = ("clear", "opaque", "translucent", "mirror")
+    """Scenario names, separated by commas."""
+    episodes: int = 20
+    """Episodes per scenario."""
+    seed: int = 0
+    """Chooses the block of episode seeds: episode i has seed 100000 * SEED + i in every scenario."""
+    sensor_noise: str = "nominal"
+    """ideal, nominal or conservative."""
+    image_size: tuple[int, int] | None = None
+    """Height and width of the wrist image, px; 240 320 by default, for an agent those of its training."""
+    workers: int = 1
+    """Number of processes."""
+    backend: str = "loky"
+    """Where the processes run: loky (this machine) or ray (a Ray cluster)."""
+
+    def check(self) -> None:
+        """Check everything that can be checked without building an environment.
+
+        Raises:
+            UsageError: naming the first bad value and what is allowed.
+        """
+        from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
+        from fixation_gym.evaluation.workers import check_backend
+        from policies.catalogue import check_detector, check_policy
+
+        check_policy(self.policy)
+        check_detector(self.detector, self.policy)
+        check_names(self.scenarios, SCENARIO_NAMES, "scenario")
+        check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
+        if len(set(self.scenarios)) < len(self.scenarios):
+            raise UsageError(f"--scenario must name one or more different scenarios, got {','.join(self.scenarios)!r}")
+        if not 1 <= self.episodes <= SEED_BLOCK:
+            raise UsageError(f"--episodes must be within 1..{SEED_BLOCK}, got {self.episodes}")
+        if self.seed < 0:
+            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
+        size = self.surroundings.image_size
+        if not all(_IMAGE_SIZES[0] <= length <= _IMAGE_SIZES[1] for length in size):
+            raise UsageError(f"--image-size must be within {_IMAGE_SIZES[0]}..{_IMAGE_SIZES[1]}, got {size}")
+        check_backend(self.backend, self.workers)
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Where the policy acts, with the image size that is asked for."""
+        from policies.catalogue import surroundings
+
+        own = surroundings(self.policy)
+        return own if self.image_size is None else replace(own, image_size=self.image_size)
+
+    def run_description(self) -> dict[str, Any]:
+        """Everything the result of one episode depends on, apart from its scenario and seed."""
+        from policies.catalogue import source_hashes
+
+        surroundings = self.surroundings
+        return {
+            "policy": self.policy,
+            "seed": self.seed,
+            "sensor_noise": self.sensor_noise,
+            "image_size": list(surroundings.image_size),
+            "env_id": surroundings.env_id,
+            **({} if self.detector is None else {"detector": self.detector}),
+            **source_hashes(self.policy, self.detector),
+            "gl": os.environ.get("MUJOCO_GL"),
+            "versions": installed_versions(),
+        }
+
+    def episode_keys(self) -> list[EpisodeKey]:
+        """(scenario, seed) of every episode, in order."""
+        return [(scenario, seed) for scenario in self.scenarios for seed in episode_seeds(self.seed, self.episodes)]
+
+    def cell(self, key: EpisodeKey) -> Cell:
+        """The episode with this key, as ``workers.run_cell`` takes it."""
+        scenario, seed = key
+        surroundings = self.surroundings
+        return {
+            "env_id": surroundings.env_id,
+            "scenario": scenario,
+            "policy": self.policy,
+            "detector": self.detector,
+            "seed": seed,
+            "sensor_noise": self.sensor_noise,
+            "image_size": list(surroundings.image_size),
+        }
+
+
+def episode_seeds(seed: int, episodes: int) -> list[int]:
+    """Seeds of the episodes of one scenario; blocks of different ``seed`` never overlap."""
+    return [seed * SEED_BLOCK + index for index in range(episodes)]
