@@ -196,7 +196,8 @@ def test_by_default_all_scenarios_with_obstacles_are_tried_with_all_ways():
     assert all(cell_key(cell) == key for key, cell in [*choosing.items(), *judging.items()])
     assert {seed % 2 for *_, seed in choosing} == {0}
     assert {seed % 2 for *_, seed in judging} == {1}
-    assert config.policies()["blind"] == "blind"
+    assert config.policies() == {"blind": "blind", "blind:slow": "blind:slow"}
+    assert NecessityConfig(beside=()).policies() == {}
 
 
 def test_another_agent_is_another_member(tmp_path: Path):
@@ -218,6 +219,7 @@ def test_another_agent_is_another_member(tmp_path: Path):
         (["--workers", "0"], "--workers must be at least 1"),
         (["--agent", "agent.txt"], "--agent must be an agent's .zip, got agent.txt"),
         (["--agent", "nowhere.zip"], "nowhere.zip"),
+        (["--beside", "oracle"], "unknown policy 'oracle'; choose one of servo, blind"),
         (["--evaluation", "nowhere"], "cannot read nowhere/run.json: it is missing"),
     ],
 )

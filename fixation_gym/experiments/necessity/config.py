@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from policies.blind_ways import BlindWay
 
 ORACLE = "oracle"
-POLICIES = ("blind", "blind:slow")
-"""Blind policies that see the target with the wrist camera."""
 QUICK_SCENARIOS = ("opaque", "screen", "clutter")
 
 Key = tuple[str, str, int]
@@ -42,6 +40,8 @@ class NecessityConfig:
     --quick."""
     seed: int = 0
     """Chooses the block of episode seeds, as for evaluate."""
+    beside: Names = ("blind", "blind:slow")
+    """Policies that see the target with the wrist camera, to put beside the ways; "" for none."""
     agent: Path | None = None
     """An agent's zip, such as a trained blind one, to put beside the ways."""
     evaluation: Path | None = None
@@ -57,7 +57,7 @@ class NecessityConfig:
         """
         from fixation_gym.envs.config import SCENARIO_NAMES
         from fixation_gym.evaluation.workers import check_backend
-        from policies.catalogue import AGENT_SUFFIX, check_policy
+        from policies.catalogue import AGENT_SUFFIX, POLICY_NAMES, check_policy
 
         names = self.scenario_names
         check_names(names, SCENARIO_NAMES, "scenario")
@@ -67,6 +67,7 @@ class NecessityConfig:
             raise UsageError(f"--episodes must be an even number within 2..{SEED_BLOCK}, got {self.episodes}")
         if self.seed < 0:
             raise UsageError(f"--seed must be 0 or more, got {self.seed}")
+        check_names(self.beside, [name for name in POLICY_NAMES if name != ORACLE], "policy")
         if self.agent is not None:
             if self.agent.suffix != AGENT_SUFFIX:
                 raise UsageError(f"--agent must be an agent's {AGENT_SUFFIX}, got {self.agent}")
@@ -93,9 +94,7 @@ class NecessityConfig:
 
     def policies(self) -> dict[str, str]:
         """Names or files of the policies that need images, by member; another agent is another member."""
-        from policies.catalogue import POLICY_NAMES
-
-        members = {name: name for name in POLICIES if name in POLICY_NAMES}
+        members = {name: name for name in self.beside}
         if self.agent is not None:
             digest = hashlib.sha256(self.agent.read_bytes()).hexdigest()
             members[f"{AGENT}:{digest[:12]}"] = str(self.agent)

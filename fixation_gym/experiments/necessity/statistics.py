@@ -16,10 +16,8 @@ AGENT = "agent"
 ALL = "all"
 """Name of the row of the best way for all scenarios at once. It has no intervals: scenes of the same seed have much in
 common, such as the free way, whatever the scenario."""
-COMPARED = ("blind", "blind:slow", AGENT, "oracle")
-"""Columns beside the best way, as far as there are such episodes."""
-
-
+_OF_WAYS = ("best", "chosen_on")
+"""Beginnings of the columns that are about ways."""
 EVALUATED = "evaluated"
 """Beginning of the columns of an evaluation that is paired with the best way."""
 
@@ -182,16 +180,16 @@ def _table_row(scenario: str, tallies: Mapping[str, Tally], ways: Sequence[str])
     row |= tallies[best].judged_on.columns("best", scenario != ALL)
     row |= {"chosen_on_k": tallies[best].chosen_on.k, "chosen_on_n": tallies[best].chosen_on.n}
     row["mean_rate"] = sum((tallies[way].chosen_on for way in ways), Counts()).rate
-    for name in COMPARED:
-        for member in tallies:
-            if member == name or (name == AGENT and member.startswith(f"{AGENT}:")):
-                row |= tallies[member].whole.columns(name, scenario != ALL)
+    for member in (name for name in tallies if name not in ways):
+        name = AGENT if member.startswith(f"{AGENT}:") else member
+        row |= tallies[member].whole.columns(name, scenario != ALL)
     return row
 
 
 def format_table(table: Sequence[Row]) -> str:
     """The table as plain text."""
-    names = [name for name in (*COMPARED, EVALUATED) if any(f"{name}_n" in row for row in table)]
+    columns = dict.fromkeys(column for row in table for column in row if column.endswith("_n"))
+    names = [name for name in (column.removesuffix("_n") for column in columns) if name not in _OF_WAYS]
     paired = any("difference" in row for row in table)
     header = ("scenario", "best blind way", "mean of all", "chosen on", "judged on [95 % CI]", *names)
     lines: list[tuple[str, ...]] = [(*header, "minus best way, points") if paired else header]
