@@ -13,7 +13,7 @@ def check_names(names: Iterable[str], valid: Iterable[str], what: str) -> None:
     """Check that there are names, and that all are known.
 
     Raises:
-        UsageError: naming the first unknown name, empty if there is none, and all valid ones in their own order.
+        UsageError: naming the first unknown name ('' for an empty list) and all valid ones in their own order.
     """
     valid = tuple(valid)
     for name in tuple(names) or ("",):

@@ -73,10 +73,10 @@ class Ablate:
 
 @dataclass(frozen=True)
 class Ladder:
-    """From the paper's algorithm to the servo, one change at a time, on the same episodes; what each change buys."""
+    """From the paper's algorithm to the servo, one step at a time, on the same episodes; what each step buys."""
 
     scenario: Names = ()
-    """Scenario names, separated by commas; by default all in which the target is red."""
+    """Scenario names, separated by commas, of those in which the target is red; all of them by default."""
     episodes: int = 20
     """Episodes per scenario and policy."""
     seed: int = 0
@@ -94,6 +94,7 @@ class Ladder:
         from policies.ladder import BESIDE, LADDER
 
         red = tuple(name for name, item in SCENARIOS.items() if not item.any_colour)
+        check_names(self.scenario or red, red, "scenario")
         config = EvaluationConfig(
             scenarios=self.scenario or red,
             episodes=self.episodes,

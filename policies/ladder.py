@@ -1,4 +1,4 @@
-"""From the paper's algorithm to the servo, one change at a time: every rung is a policy of the catalogue.
+"""From the paper's algorithm to the servo, one step at a time: every rung is a policy of the catalogue.
 
 What holds the gaze comes first, since nothing else works without it; then what is known of distance and obstacles; then
 what the arm can do; then where the hand goes.
@@ -6,14 +6,11 @@ what the arm can do; then where the hand goes.
 
 from __future__ import annotations
 
+from policies.paper import PAPER_VARIANTS
+
 LADDER: dict[str, str] = {
-    "paper": "the paper's algorithm: Eqs. 6-8, filter on flow, one grasp",
-    "paper:feed_forward": "the gaze hears of the camera's own motion before it sees it",
-    "paper:pose_filter": "distance from poses and centroids, of the thing where the target was last seen",
-    "paper:exact_test": "the exact zero-flow test, with the table's height",
-    "paper:limits": "within the arm's reach, the hand level and then across the target",
-    "paper:body": "the grasp goes for the middle of the body fitted to outlines",
-    "servo:ways_only": "memory of obstacles and choice of a way, in place of their centre of mass",
+    **{variant.name: variant.summary for variant in PAPER_VARIANTS},
+    "servo:ways_only": "memory of obstacles and choice of a way, in place of their centre of mass; the servo's gains",
     "servo:no_retry": "looking along the way before going in",
     "servo": "a second try",
 }

@@ -25,11 +25,8 @@ VIEW_DISTANCE, GRASP_DISTANCE = 0.42, 0.18
 _RETREAT_DISTANCE = 0.30
 _SPEED = 0.10
 """Of the approach, m/s."""
-_CLOSE_SECONDS = 0.8
 _HELD = 0.045
 """A target whose centre is farther than this from the tool's point is not held, m."""
-_LIFT_HEIGHT = 0.17
-"""How far to lift, m."""
 _STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
 """Elevation below which an approach is avoided where possible, for round targets and for those the hand turns to."""
 _GAINS = open_loop.OpenLoopGains()
@@ -97,7 +94,7 @@ class OraclePolicy:
                 self._begin("fixate", pose, target, time)
             return
         held = np.linalg.norm(target - self._env.sim.tool_position()) < _HELD
-        if self._phase in ("close", "lift") and elapsed > _CLOSE_SECONDS and not held:
+        if self._phase in ("close", "lift") and elapsed > _GAINS.close_seconds and not held:
             self._begin("recover", pose, target, time)
             return
         arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003
@@ -105,7 +102,7 @@ class OraclePolicy:
             "fixate": self._angle(pose, target) < _NEAR_ANGLE or elapsed > 8.0,
             "approach": distance < GRASP_DISTANCE * 1.03,
             "grasp": arrived or elapsed > 4.0,
-            "close": elapsed > _CLOSE_SECONDS,
+            "close": elapsed > _GAINS.close_seconds,
             "lift": False,
             "recover": arrived or elapsed > 3.0,
         }[self._phase]
@@ -120,7 +117,7 @@ class OraclePolicy:
         if phase == "grasp":
             self._goal = self._grasp_point(pose, target) - pose[:3, :3] @ ROBOT.tool_in_camera
         elif phase == "lift":
-            self._goal = open_loop.lifted(pose, _LIFT_HEIGHT)
+            self._goal = open_loop.lifted(pose, _GAINS.lift_height)
         elif phase == "recover":
             back = max(0.0, _RETREAT_DISTANCE - float(pose[:3, 2] @ (target - pose[:3, 3])))
             self._goal = pose[:3, 3] - back * pose[:3, 2]

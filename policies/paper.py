@@ -72,7 +72,7 @@ class PaperVariant:
     summary: str
     gains: PaperGains = field(default_factory=PaperGains)
     feed_forward: bool = False
-    """Whether the gaze hears of the camera's own motion before it sees it."""
+    """Whether the camera's own motion is fed forward to the gaze."""
     estimator: Callable[[], DistanceEstimator] | None = FlowEstimator
     """Makes what tells the distance; None: poses and centroids."""
     follow: bool = False
@@ -168,7 +168,7 @@ def centre_of_what_is_in_front(percept: Percept) -> FloatArray:
 
 
 PAPER_VARIANTS: tuple[PaperVariant, ...] = (
-    PaperVariant("paper", "the paper's algorithm"),
+    PaperVariant("paper", "the paper's algorithm: Eqs. 6-8, filter on flow, one grasp"),
     PaperVariant("paper:feed_forward", "gaze with feed-forward of the camera's own motion", feed_forward=True),
     PaperVariant(
         "paper:pose_filter",

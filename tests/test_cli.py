@@ -13,7 +13,7 @@ import pytest
 from fixation_gym import cli, doctor, gl, learning_commands, report_commands
 from fixation_gym.evaluation import clips, demo, evaluate
 from fixation_gym.evaluation.config import EvaluationConfig
-from fixation_gym.reporting import ablation
+from fixation_gym.reporting import ablation, ladder
 from policies.rl.config import TrainConfig
 
 
@@ -146,6 +146,25 @@ def test_ablate_always_runs_the_full_servo_first(
     assert cli.main(["ablate", "--out", str(tmp_path), "--variant", "servo:no_retry,blind"]) == 0
     assert seen == [("servo", "servo:no_retry", "blind")]
     assert str(tmp_path / "report.html") in capsys.readouterr().out
+
+
+def test_ladder_climbs_in_the_scenarios_with_red_targets(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[evaluate.EvaluationConfig] = []
+
+    def fake_climb(config: evaluate.EvaluationConfig, *rest: Any) -> list[dict[str, Any]]:
+        seen.append(config)
+        return []
+
+    monkeypatch.setattr(ladder, "climb", fake_climb)
+    assert cli.main(["ladder", "--out", str(tmp_path), "--episodes", "3"]) == 0
+    assert "any_colour" not in seen[0].scenarios
+    assert {"clear", "discovery"} < set(seen[0].scenarios)
+    assert (seen[0].episodes, seen[0].policy) == (3, "servo")
+    assert str(tmp_path / "ladder.csv") in capsys.readouterr().out
+    assert cli.main(["ladder", "--scenario", "any_colour"]) == 2
+    assert "unknown scenario 'any_colour'; choose one of clear" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fixation_gym.envs.object_pool import THINGS
-from fixation_gym.envs.shapes import Part, Shape, Vector, pane, scaled, without
+from fixation_gym.envs.shapes import Part, Shape, pane, scaled, without
+from fixation_gym.types import Vector
 
 MATERIALS = ("opaque", "translucent", "mirror", "wire")
 """Wood, bricks or metal; glass with rims; one framed mirror; bars."""

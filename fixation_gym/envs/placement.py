@@ -13,10 +13,10 @@ from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.obstacle_kinds import ObstacleKind, kinds_of
 from fixation_gym.envs.scene import ObstacleSpec
-from fixation_gym.envs.shapes import Part, Shape, Vector, centred, placed_boxes
+from fixation_gym.envs.shapes import Part, Shape, centred, placed_boxes
 from fixation_gym.geometry.boxes import Box, BoxSet
 from fixation_gym.robots import ROBOT
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, Vector
 
 OBSTACLE_TEXTURES = ("wood_light", "wood_dark", "wood_plain", "bricks", "metal")
 _PUSH_SPEED = 0.15

@@ -24,9 +24,8 @@ from fixation_gym.envs.goal import Goal, Way, sample_goal, sample_target
 from fixation_gym.envs.placement import FREE_ROOM
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
-from fixation_gym.envs.shapes import Vector
 from fixation_gym.robots import ROBOT
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, Vector
 
 _VIEW_DISTANCE = (0.42, 0.49)
 """Range of the distance between camera and target at the start, m."""

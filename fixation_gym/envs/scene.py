@@ -8,9 +8,9 @@ import numpy as np
 
 from fixation_gym.envs.motion import Motion, places
 from fixation_gym.envs.object_pool import target_shape
-from fixation_gym.envs.shapes import Shape, Vector
+from fixation_gym.envs.shapes import Shape
 from fixation_gym.geometry.boxes import Box, BoxSet, joined
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, Vector
 
 RED = (0.80, 0.06, 0.05, 1.0)
 """Colour of targets and distractors, where it is not drawn."""

@@ -24,8 +24,8 @@ from fixation_gym.envs.scene_mjcf import (
     quaternion,
     red_part_name,
 )
-from fixation_gym.envs.shapes import Part, Shape, Vector
-from fixation_gym.types import FloatArray
+from fixation_gym.envs.shapes import Part, Shape
+from fixation_gym.types import FloatArray, Vector
 
 _LABEL_RGBA = (0.85, 0.85, 0.25, 1.0)
 

@@ -25,6 +25,7 @@ def ablate(
     pictures: int,
     film: bool = False,
     run: Callable[[workers.Cell], dict[str, Any]] = workers.run_cell,
+    title: str = TITLE,
 ) -> tuple[dict[str, Any], list[EpisodeResult]]:
     """Evaluate every variant in a folder of its own, then write their report. The same call resumes a killed one.
 
@@ -35,6 +36,7 @@ def ablate(
         pictures: most failures to show with pictures.
         film: whether to make pictures of failed episodes.
         run: runs one cell; tests replace it.
+        title: heading of the report.
 
     Returns:
         The summary of the report, as in ``summary.json``, and episodes that could not be filmed.
@@ -50,7 +52,7 @@ def ablate(
     different = [
         result for folder in folders if film for result in film_failures(folder, config.workers, config.backend)
     ]
-    return write_report(folders, out, pictures, TITLE), different
+    return write_report(folders, out, pictures, title), different
 
 
 def variant_folder(name: str) -> str:

@@ -1,4 +1,4 @@
-"""``fixation-gym ladder``: from the paper's algorithm to the servo on the same episodes; what each change buys."""
+"""``fixation-gym ladder``: from the paper's algorithm to the servo on the same episodes; what each step buys."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from fixation_gym.reporting.comparison import ALL, compare_success
 from fixation_gym.reporting.digest import PolicyRecord, digest, scenario_names
 from fixation_gym.reporting.figures import new_figure, png
 
+TITLE = "From the paper's algorithm to the servo"
 LADDER_FILE, FIGURE_FILE = "ladder.csv", "ladder.png"
 Row = dict[str, Any]
 
@@ -51,7 +52,7 @@ def climb(
     make_folder(out)
     check_no_folders(out, (LADDER_FILE, FIGURE_FILE))
     names = [*ladder, *beside]
-    ablate(config, names, out, pictures, run=run)
+    ablate(config, names, out, pictures, run=run, title=TITLE)
     records = digest([read_evaluation(out / variant_folder(name)) for name in names])
     rows = [row for index, name in enumerate(names) for row in _rows(records, index, ladder.get(name, ""), len(ladder))]
     write_csv(out / LADDER_FILE, rows)

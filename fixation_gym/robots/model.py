@@ -61,7 +61,7 @@ class Hand:
     finger_length: float
     """From the tool's point back to the palm between the fingers, which must not touch the target, m."""
     palm_room: float
-    """Depth behind the tool's point to which also what is wide fits, m: edges of the hand stand before the palm."""
+    """Depth behind the tool's point that even wide things fit into, m; edges of the hand come before the palm."""
     finger_span: Range
     """Widths of a thing that the open fingers get around for sure, and not at all, m."""
     grasp_widths: Range

@@ -14,15 +14,17 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
+from fixation_gym.robots import ROBOT
 
 VIEWS: dict[str, str | None] = {"zfc": "zfc_map", "blind": None, "rgb": "rgb", "privileged": "true_map"}
 """Key of the view in the observation, by the observation's name."""
 IMAGE_CELLS = 48
 """Images are shrunk to this height and width, px."""
-STAGE = slice(20, 24)
+_JOINTS = ROBOT.arm.joints
+STAGE = slice(_JOINTS + 13, _JOINTS + 17)
 """Of ``proprio``: stage of the manoeuvre."""
 
-_VECTOR = 28
+_VECTOR = _JOINTS + 21
 _LEAK = 0.97
 """Share of remembered evidence that is left after a control period: it halves in a second."""
 _GAIN = 0.25
@@ -91,16 +93,17 @@ def blind_stage(obs: Mapping[str, Any]) -> bool:
 def _vector(fixation: NDArray[np.float32], proprio: NDArray[np.float32]) -> NDArray[np.float32]:
     """Fixation and proprioception, each value of the order of 1; the stage is left out: decisions are made in none."""
     x, y, visible, distance, std = fixation
-    position = (proprio[7:10] - (0.35, 0.0, 0.2)) / 0.2
-    twist = proprio[13:19] / np.repeat([0.15, 0.5], 3)
+    joints, (position, axis, twist, width) = proprio[:_JOINTS], np.split(proprio[_JOINTS:], [3, 6, 12, 13])[:4]
+    position = (position - (0.35, 0.0, 0.2)) / 0.2
+    twist = twist / np.repeat([0.15, 0.5], 3)
     relative_std = np.log10(np.clip(std / max(distance, 1e-3), 1e-3, 1.0)) + 1.5
     values = [
         *(5.0 * x, 5.0 * y, visible, 5.0 * (distance - 0.3), 1.0 / max(distance, 0.1) - 3.0, relative_std),
-        *proprio[:7] / 2.0,
+        *joints / 2.0,
         *position,
-        *2.0 * proprio[10:13],
+        *2.0 * axis,
         *twist,
-        *(proprio[19] / 0.04 - 1.0, np.arctan2(-proprio[12], np.hypot(proprio[10], proprio[11])) * 2.0 - 1.5),
+        *(width[0] / 0.04 - 1.0, np.arctan2(-axis[2], np.hypot(axis[0], axis[1])) * 2.0 - 1.5),
     ]
     # The product of the camera's bearing is what tells the way around the object from the way above it.
-    return np.clip(np.array([*values, np.arctan2(proprio[11], proprio[10])], np.float32), -10.0, 10.0)
+    return np.clip(np.array([*values, np.arctan2(axis[1], axis[0])], np.float32), -10.0, 10.0)

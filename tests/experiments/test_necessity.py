@@ -197,7 +197,9 @@ def test_by_default_all_scenarios_with_obstacles_are_tried_with_all_ways():
     assert {seed % 2 for *_, seed in choosing} == {0}
     assert {seed % 2 for *_, seed in judging} == {1}
     assert config.policies() == {"blind": "blind", "blind:slow": "blind:slow"}
-    assert NecessityConfig(beside=()).policies() == {}
+    alone = NecessityConfig(beside=())
+    alone.check()
+    assert alone.policies() == {}
 
 
 def test_another_agent_is_another_member(tmp_path: Path):

@@ -44,7 +44,7 @@ _GAZE_GAIN, _POSITION_GAIN, _TURN_GAIN = 4.0, 2.0, 2.0
 _ATTENTION_PX = 64
 """Images are looked at up to this far around where the target was; all of the image when it is lost."""
 _NO_IMAGE = np.zeros((0, 0), np.float32)
-"""No estimator looks at the image itself, and 276 of them would take much room."""
+"""No estimator looks at the image itself, and hundreds of them would take much room."""
 
 
 @dataclass(frozen=True, eq=False)

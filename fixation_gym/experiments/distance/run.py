@@ -11,7 +11,7 @@ import numpy as np
 from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.workers import prepare_process
 from fixation_gym.experiments.distance.config import DistanceConfig
-from fixation_gym.experiments.distance.sequence import INTRINSICS, Condition, Motion
+from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, INTRINSICS, Condition, Motion
 from fixation_gym.experiments.distance.statistics import summarise
 from fixation_gym.experiments.runner import Cell, Experiment, kept_rig
 
@@ -44,7 +44,6 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     from fixation_gym.experiments.distance.estimates import assess, bounds, methods, run
     from fixation_gym.experiments.distance.recording import record
     from fixation_gym.experiments.distance.rig import PrintRig
-    from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX
 
     condition = Condition(**{name: value for name, value in cell.items() if name != "noise"})
     noise = SENSOR_NOISE[cell["noise"]]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from fixation_gym.errors import UsageError, check_names
-from fixation_gym.evaluation.config import SEED_BLOCK, episode_seeds
+from fixation_gym.evaluation.config import SEED_BLOCK, EvaluationConfig, episode_seeds
 from fixation_gym.experiments.necessity.statistics import AGENT
 from fixation_gym.names import Names
 
@@ -67,7 +67,8 @@ class NecessityConfig:
             raise UsageError(f"--episodes must be an even number within 2..{SEED_BLOCK}, got {self.episodes}")
         if self.seed < 0:
             raise UsageError(f"--seed must be 0 or more, got {self.seed}")
-        check_names(self.beside, [name for name in POLICY_NAMES if name != ORACLE], "policy")
+        if self.beside:
+            check_names(self.beside, [name for name in POLICY_NAMES if name != ORACLE], "policy")
         if self.agent is not None:
             if self.agent.suffix != AGENT_SUFFIX:
                 raise UsageError(f"--agent must be an agent's {AGENT_SUFFIX}, got {self.agent}")
@@ -115,6 +116,8 @@ class NecessityConfig:
             raise UsageError(
                 f"--evaluation must be of --seed {self.seed}, but {self.evaluation} is of seed {read.run['seed']}"
             )
+        if read.run["sensor_noise"] != EvaluationConfig.sensor_noise:
+            raise UsageError(f"--evaluation must be of nominal sensor noise, but {self.evaluation} is not")
         return {(result.scenario, result.seed): result.collision_free_success for result in read.results}
 
     def choosing(self) -> dict[Key, Cell]:

@@ -56,9 +56,8 @@ def run_cell(cell: Cell) -> dict[str, Any]:
 def _run_with_images(cell: Cell) -> dict[str, Any]:
     """Run the episode of a policy of the catalogue in the environment in which ``evaluate`` runs it."""
     from fixation_gym.experiments.necessity.episodes import play_in
-    from policies.catalogue import surroundings
 
-    config = EvaluationConfig(policy=cell["policy"], image_size=surroundings(cell["policy"]).image_size)
+    config = EvaluationConfig(policy=cell["policy"])
     env, policy = workers.world(config.cell((cell["scenario"], cell["seed"])))
     return {**_named(cell), **asdict(play_in(env, policy, cell["seed"]))}
 

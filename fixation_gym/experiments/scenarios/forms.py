@@ -13,7 +13,8 @@ import numpy as np
 
 from fixation_gym.envs.object_pool import THINGS
 from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS
-from fixation_gym.envs.shapes import Part, Shape, Vector, centred, scaled, without
+from fixation_gym.envs.shapes import Part, Shape, centred, scaled, without
+from fixation_gym.types import Vector
 
 STAND = "stand"
 _LEANING = next(kind for kind in OBSTACLE_KINDS if kind.name == "leaning_board")

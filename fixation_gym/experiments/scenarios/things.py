@@ -16,12 +16,12 @@ import numpy as np
 
 from fixation_gym.control.corridor import boxes_meet
 from fixation_gym.envs.scene import ObstacleSpec
-from fixation_gym.envs.shapes import Shape, Vector
+from fixation_gym.envs.shapes import Shape
 from fixation_gym.experiments.scenarios.forms import draw_thing, hung, raised, turned
 from fixation_gym.experiments.scenarios.view import SceneView, Sight
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.robots import ROBOT
-from fixation_gym.types import FloatArray
+from fixation_gym.types import FloatArray, Vector
 
 Form = Literal["standing", "raised", "hung"]
 TEXTURES = ("wood_light", "wood_dark", "bricks", "metal")

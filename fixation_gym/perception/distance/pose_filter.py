@@ -88,7 +88,7 @@ class Fixation:
     distance_std_m: float
     """Its standard deviation, m; positive and finite."""
     nis: float
-    """Normalised innovation squared of the last measurement, as of 2 degrees of freedom; NaN if there was none."""
+    """Normalised innovation squared of the last measurement, as of 2 degrees of freedom; 0 or NaN if there was none."""
     initialised: bool
     """False until the object was seen once; then the point is only the prior guess on the optical axis."""
     lens: tuple[float, float] | None = None
