@@ -152,6 +152,11 @@ class Fixator:
         largest = min(gains.max_roll, open_loop.largest_roll(self.T_base_cam, self.target, self.gains.open_loop))
         return narrow_axis(percept.segmentation.mask, gaze.roll(self.T_base_cam), max(largest, _LEAST_ROLL))
 
+    def excess_roll(self) -> float:
+        """By how much the hand is turned farther than the open fingers allow at the grasp, rad."""
+        largest = open_loop.largest_roll(self.T_base_cam, self.target, self.gains.open_loop)
+        return max(0.0, abs(gaze.roll(self.T_base_cam)) - largest)
+
     def _gazing_twist(self, v: FloatArray, roll_error: float | None) -> FloatArray:
         fixation, gains = self.percept.fixation, self.gains.gaze
         if not fixation.initialised and roll_error is None:

@@ -45,7 +45,7 @@ class OpenLoopGains:
     """In the grasp, how far the tool stays back per metre that it is off the approach axis."""
     funnel_length: float = 0.06
     """Largest distance that it stays back, m."""
-    tool_tolerance: float = 0.0015
+    tool_tolerance: float = 0.001
     """Distance at which the tool has arrived, m: small balls slip out of fingers that close higher up ..."""
     coarse_tolerance: float = 0.004
     """... and the distance that is good enough ..."""

@@ -72,6 +72,11 @@ class ServoGains:
     """Relative distance error needed for the grasp."""
     grasp_centred: float = 0.06
     """Largest offset of the target from the image centre for the grasp, normalised coordinates."""
+    grasp_excess_roll: float = 0.02
+    """By how much more than low fingers allow the hand may be turned at the grasp, rad: circling turns it to and fro by
+    0.1 ..."""
+    level_patience: float = 15.0
+    """... until it has approached for so long, s."""
     max_grasps: float = math.inf
     """After this many grasps it tries no other."""
     lost_seconds: float = 0.6

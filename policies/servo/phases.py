@@ -31,11 +31,13 @@ class Situation:
     distance: float
     """Z_f, m."""
     distance_std: float
-    """Its standard deviation, m."""
+    """How surely it is known, or the depth of the body's centre if that is known better: standard deviation, m."""
     offset: float
     """Distance of the target from the image centre, normalised coordinates."""
     blocked: bool
     """Whether something stands in the way of the hand."""
+    excess_roll: float = 0.0
+    """By how much the hand is turned farther than low fingers allow, rad."""
     grasps: int = 0
     """Number of grasps so far."""
 
@@ -53,5 +55,6 @@ def next_phase(phase: Phase, now: Situation, gains: ServoGains) -> Phase | Stage
         return Phase.APPROACH if known else Phase.FIXATE
     near = now.distance < gains.grasp_tolerance * gains.desired_distance
     sure = relative_std < gains.grasp_relative_std and now.offset < gains.grasp_centred
-    may_grasp = not now.blocked and now.grasps < gains.max_grasps
+    level = now.excess_roll < gains.grasp_excess_roll or now.phase_seconds > gains.level_patience
+    may_grasp = level and not now.blocked and now.grasps < gains.max_grasps
     return Stage.GRASP if near and sure and may_grasp else Phase.APPROACH

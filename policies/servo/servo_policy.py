@@ -172,6 +172,7 @@ class ServoPolicy:
             distance_std=self._goal_std(percept),
             offset=float(np.linalg.norm(fixation.centroid)),
             blocked=obstacle.evidence > self.gains.obstacle_evidence,
+            excess_roll=self._fixator.excess_roll(),
             grasps=self._grasps,
         )
         phase = next_phase(self._phase, situation, self.gains)
@@ -183,7 +184,7 @@ class ServoPolicy:
             self._phase, self._phase_start = phase, time
 
     def _goal_std(self, percept: Percept) -> float:
-        """How surely the depth of what a grasp goes for is known, m: the body's centre, once there is one."""
+        """Standard deviation of Z_f or, if that is smaller, of the depth of the body's centre, m."""
         std = percept.fixation.distance_std_m
         return std if percept.body is None else min(std, percept.body.depth(self._fixator.T_base_cam)[1])
 

@@ -32,6 +32,8 @@ READY = Situation(
         (Phase.APPROACH, {"blocked": True}, Phase.APPROACH),
         (Phase.APPROACH, {"offset": 0.2}, Phase.APPROACH),
         (Phase.APPROACH, {"distance_std": 0.05}, Phase.APPROACH),
+        (Phase.APPROACH, {"excess_roll": 0.1}, Phase.APPROACH),
+        (Phase.APPROACH, {"excess_roll": 0.1, "phase_seconds": 16.0}, Stage.GRASP),
         (Phase.APPROACH, {"unseen_seconds": 2.0}, Phase.SEARCH),
         (Phase.APPROACH, {}, Stage.GRASP),
     ],
