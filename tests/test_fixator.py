@@ -74,3 +74,13 @@ def test_low_things_leave_no_room_for_a_turned_hand_and_high_ones_do():
     assert np.all(np.diff(rolls) >= 0.0)
     assert rolls[-1] == pytest.approx(np.pi / 2)
     assert largest_roll(pose, Target(TARGET, None, 0.0), OpenLoopGains()) == pytest.approx(np.pi / 2)
+
+
+def test_how_much_too_far_the_hand_is_turned_depends_on_how_low_the_target_is(monkeypatch):
+    fixator, turned = Fixator(Perception(CAMERA)), START @ exp_twist(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.1]), 1.0)
+    fixator.look(observation(turned, 0.0))
+    assert fixator.excess_roll() == 0.0  # nothing is known of the target's body
+    for height, excess in ((0.012, 0.1), (0.060, 0.0)):
+        low = Target(np.array([0.55, 0.0, height]), 0.02, 0.0)
+        monkeypatch.setattr(Fixator, "target", property(lambda _, low=low: low))
+        assert fixator.excess_roll() == pytest.approx(excess, abs=0.005)
