@@ -149,13 +149,15 @@ class Fixator:
         percept, gains = self.percept, self.gains.gaze
         if percept.fixation.distance_m >= gains.align_distance or not percept.segmentation.whole:
             return None
-        largest = min(gains.max_roll, open_loop.largest_roll(self.T_base_cam, self.target, self.gains.open_loop))
+        largest = min(gains.max_roll, self._largest_roll())
         return narrow_axis(percept.segmentation.mask, gaze.roll(self.T_base_cam), max(largest, _LEAST_ROLL))
 
     def excess_roll(self) -> float:
         """By how much the hand is turned farther than the open fingers allow at the grasp, rad."""
-        largest = open_loop.largest_roll(self.T_base_cam, self.target, self.gains.open_loop)
-        return max(0.0, abs(gaze.roll(self.T_base_cam)) - largest)
+        return max(0.0, abs(gaze.roll(self.T_base_cam)) - self._largest_roll())
+
+    def _largest_roll(self) -> float:
+        return open_loop.largest_roll(self.T_base_cam, self.target, self.gains.open_loop)
 
     def _gazing_twist(self, v: FloatArray, roll_error: float | None) -> FloatArray:
         fixation, gains = self.percept.fixation, self.gains.gaze

@@ -31,7 +31,7 @@ _STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
 """Elevation below which an approach is avoided where possible, for round targets and for those the hand turns to."""
 _GAINS = open_loop.OpenLoopGains()
 _MOVED = 0.02
-"""A target that is farther than this from where it was aimed at is aimed at anew, m."""
+"""A target that is farther than this from where it was aimed at is aimed at again, m."""
 _NEAR_ANGLE = math.radians(4.0)
 _PHASES = ("fixate", "approach", "grasp", "close", "lift")
 

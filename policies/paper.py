@@ -167,47 +167,41 @@ def centre_of_what_is_in_front(percept: Percept) -> FloatArray:
     return np.array([x[front].mean(), y[front].mean()])
 
 
-PAPER_VARIANTS: tuple[PaperVariant, ...] = (
-    PaperVariant("paper", "the paper's algorithm: Eqs. 6-8, filter on flow, one grasp"),
-    PaperVariant("paper:feed_forward", "gaze with feed-forward of the camera's own motion", feed_forward=True),
-    PaperVariant(
-        "paper:pose_filter",
-        "distance from poses and centroids, of the thing where the target was last seen",
-        feed_forward=True,
-        estimator=None,
-        follow=True,
-    ),
-    PaperVariant(
-        "paper:exact_test",
-        "the exact zero-flow test, with the table's height",
-        feed_forward=True,
-        estimator=None,
-        follow=True,
-        rule=exact_rule,
-        knows_table=True,
-    ),
-    PaperVariant(
-        "paper:limits",
-        "within the arm's reach, the hand level and then across the target",
-        feed_forward=True,
-        estimator=None,
-        follow=True,
-        rule=exact_rule,
-        knows_table=True,
-        limits=True,
-    ),
-    PaperVariant(
-        "paper:body",
-        "the grasp goes for the middle of the body fitted to outlines",
-        feed_forward=True,
-        estimator=None,
-        follow=True,
-        rule=exact_rule,
-        knows_table=True,
-        limits=True,
-        body=True,
-    ),
+_PAPER = PaperVariant("paper", "the paper's algorithm: Eqs. 6-8, filter on flow, one grasp")
+_FEED_FORWARD = replace(
+    _PAPER,
+    name="paper:feed_forward",
+    summary="gaze with feed-forward of the camera's own motion",
+    feed_forward=True,
 )
+_POSE_FILTER = replace(
+    _FEED_FORWARD,
+    name="paper:pose_filter",
+    summary="distance from poses and centroids, of the thing where the target was last seen",
+    estimator=None,
+    follow=True,
+)
+_EXACT_TEST = replace(
+    _POSE_FILTER,
+    name="paper:exact_test",
+    summary="the exact zero-flow test, with the table's height",
+    rule=exact_rule,
+    knows_table=True,
+)
+_LIMITS = replace(
+    _EXACT_TEST,
+    name="paper:limits",
+    summary="within the arm's reach, the hand level and then across the target",
+    limits=True,
+)
+_BODY = replace(
+    _LIMITS,
+    name="paper:body",
+    summary="the grasp goes for the middle of the body fitted to outlines",
+    body=True,
+)
+PAPER_VARIANTS = (_PAPER, _FEED_FORWARD, _POSE_FILTER, _EXACT_TEST, _LIMITS, _BODY)
+"""Each has one step more than the one before."""
 PAPER_NAMES = tuple(variant.name for variant in PAPER_VARIANTS)
 
 

@@ -60,7 +60,7 @@ class OpenLoopGains:
     top_room: float = 0.006
     """However flat the fingers come in, the tool stays this far below the top of the target, m."""
     reaim_distance: float = 0.008
-    """A grasp is aimed anew when the target is farther than this from where it was, m."""
+    """A grasp is aimed again when the target is farther than this from where it was, m."""
     grasp_timeout: float = 4.0
     """A motion that takes longer has failed, s."""
     close_seconds: float = 0.8

@@ -72,7 +72,7 @@ class Scenario:
     distractor: float = 0.0
     """Probability of a second object of the target's colour, which stays in its place."""
     coloured_frames: bool = False
-    """Whether frames and rims are of colours drawn anew for each obstacle, instead of one dark grey. Nothing else of a
+    """Whether frames and rims are of colours drawn for each obstacle, instead of one dark grey. Nothing else of a
     scene differs."""
     any_colour: bool = False
     """Whether target, distractor and obstacles are of any colour and texture; the box in the first image tells which

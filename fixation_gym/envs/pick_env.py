@@ -192,7 +192,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         return np.ascontiguousarray(np.hstack([wrist, self._image("front", qpos)]))
 
     def close(self) -> None:
-        """Free GL contexts, windows and the simulation; may be called twice. A reset would build them anew."""
+        """Free GL contexts, windows and the simulation; may be called twice. A reset would build them again."""
         for view in self._views.values():
             view.close()
         self._views = {}

@@ -156,6 +156,6 @@ def _network(path: Path, card: AgentCard, observation: str, size: int, weights: 
     try:
         target.load_state_dict(weights)
     except (RuntimeError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"{path} does not hold the weights of a {card.algorithm} agent; train it anew") from error
+        raise UsageError(f"{path} does not hold the weights of a {card.algorithm} agent; train it again") from error
     policy.set_training_mode(False)
     return policy

@@ -100,7 +100,7 @@ def _read(path: Path) -> tuple[AgentCard, bytes]:
     if len(card.image_size) != 2 or not all(isinstance(number, int) for number in numbers):
         raise _damaged(path)
     if card.format != FORMAT or not known:
-        raise UsageError(f"{path} is an agent of another version (format {card.format}, here {FORMAT}); train it anew")
+        raise UsageError(f"{path} is an agent of another version (format {card.format}, here {FORMAT}); train it again")
     return card, weights
 
 

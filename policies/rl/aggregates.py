@@ -29,7 +29,7 @@ def interquartile_mean(scores: FloatArray) -> float:
 def bootstrap_interval(
     scores: FloatArray, statistic: Callable[[FloatArray], float] = interquartile_mean, confidence: float = 0.95
 ) -> tuple[float, float]:
-    """Percentile interval of a statistic by the stratified bootstrap: in every column, rows are drawn anew.
+    """Percentile interval of a statistic by the stratified bootstrap: in every column, rows are drawn again.
 
     The draws are the same every time.
 

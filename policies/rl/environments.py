@@ -76,7 +76,7 @@ def _spawn(makers: list[Callable[[], gym.Env[Any, Any]]]) -> SubprocVecEnv:
 
 @contextlib.contextmanager
 def closing(envs: SubprocVecEnv) -> Iterator[SubprocVecEnv]:
-    """Close the worker processes at the end, also those that are amid a step or lost their siblings."""
+    """Close the worker processes at the end, also those that are during a step or lost their siblings."""
     try:
         yield envs
     finally:

@@ -1,4 +1,4 @@
-"""Evaluation of a model amid its training: the same episodes every time, the actions without noise."""
+"""Evaluation of a model during its training: the same episodes every time, the actions without noise."""
 
 from __future__ import annotations
 

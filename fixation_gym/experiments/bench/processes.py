@@ -55,7 +55,7 @@ def run_worker() -> None:
 
 
 def lift_reset_rows() -> list[dict[str, Any]]:
-    """Rows of robosuite's default reset, which compiles the model anew, without and with a 128x128 image."""
+    """Rows of robosuite's default reset, which compiles the model again, without and with a 128x128 image."""
     code = f"from {__name__} import run_lift_resets; run_lift_resets()"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return json.loads(result.stdout.splitlines()[-1])

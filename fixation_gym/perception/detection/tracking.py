@@ -1,6 +1,6 @@
 """Which of several things of one colour is the target: the one where it was last seen, moved with the camera.
 
-Colour alone would take the largest thing in every image anew. The camera's own motion is known, so the place at which
+Colour alone would take the largest thing in every image. The camera's own motion is known, so the place at which
 the target must be is, too, even while it is hidden; what the target can have moved by itself meanwhile bounds how far
 off it is looked for. Value in, value out.
 """

@@ -216,7 +216,7 @@ def _adjusted(rows: FloatArray, by_pose: FloatArray, weight: FloatArray, innovat
 
 
 def _update(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
-    """Add a frame to the window and solve it anew; outliers are rejected, and restart the filter when they persist."""
+    """Add a frame to the window and solve it again; outliers are rejected, and restart the filter when they persist."""
     row = _row(state, sighting)[None]
     innovation, jacobian, by_pose = _model(state.mean, row)
     spread = jacobian[0] @ state.cov @ jacobian[0].T + _noise(row, by_pose, settings)[0]
@@ -245,7 +245,7 @@ def _update(state: CalibratingState, sighting: Sighting, settings: CalibratingSe
 
 
 def _restart(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
-    """Begin anew where the target is seen now; what was learnt about the calibration stays.
+    """Begin again where the target is seen now; what was learnt about the calibration stays.
 
     So does the distance, unless it was hardly known. Noise of the first, nearly resting frames can put it far off; as a
     prior it would keep every following start from the truth, so that one begins with the first guess.

@@ -34,7 +34,7 @@ class ConstraintSettings:
     rate_std: float = 5e-3
     """Noise of each measured camera rotation rate, rad/s."""
     farthest_m: float = 2.0
-    """A target farther than this is out of any arm's reach, m: the filter begins anew with the first guess, as a robot
+    """A target farther than this is out of any arm's reach, m: the filter begins again with the first guess, as a robot
     that believes it would run into what is in fact near."""
     centroid_std: float = 6.5e-4
     """Noise of the centroid, normalised coordinates: 0.2 px at a focal length of 308 px."""

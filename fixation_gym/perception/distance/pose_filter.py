@@ -258,7 +258,7 @@ def restart(
     image_std: float = 0.0,
     touches_border: bool = False,
 ) -> DistanceState:
-    """Begin anew where the object is seen now, with its depth and standard deviation from elsewhere, m."""
+    """Begin again where the object is seen now, with its depth and standard deviation from elsewhere, m."""
     fresh = initialise(centroid, T_base_cam, settings, image_std, touches_border)
     rho = 1.0 / max(depth, MIN_DEPTH_M)
     cov = fresh.cov.copy()
