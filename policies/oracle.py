@@ -32,7 +32,11 @@ _STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
 _GAINS = open_loop.OpenLoopGains()
 _MOVED = 0.02
 """A target that is farther than this from where it was aimed at is aimed at again, m."""
-_NEAR_ANGLE = math.radians(4.0)
+_NEAR_ANGLE, _NEAR_ROLL = math.radians(2.0), math.radians(3.0)
+"""It goes in when it looks along its way this nearly, and its hand is turned as the grasp needs: a hand that turns on
+the way in meets what stands beside the way."""
+_ARRIVED = 0.0015
+"""The fingers close within this of their goal, m: a thin thing that is held above its middle slips."""
 _PHASES = ("fixate", "approach", "grasp", "close", "lift")
 
 
@@ -97,9 +101,9 @@ class OraclePolicy:
         if self._phase in ("close", "lift") and elapsed > _GAINS.close_seconds and not held:
             self._begin("recover", pose, target, time)
             return
-        arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < 0.003
+        arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < _ARRIVED
         done = {
-            "fixate": self._angle(pose, target) < _NEAR_ANGLE or elapsed > 8.0,
+            "fixate": self._is_lined_up(pose, target) or elapsed > 8.0,
             "approach": distance < GRASP_DISTANCE * 1.03,
             "grasp": arrived or elapsed > 4.0,
             "close": elapsed > _GAINS.close_seconds,
@@ -202,6 +206,10 @@ class OraclePolicy:
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
         return math.acos(float(np.clip(present @ self._wanted(pose, target)[0], -1.0, 1.0)))
 
+    def _is_lined_up(self, pose: FloatArray, target: FloatArray) -> bool:
+        """Whether the hand is on its way, and turned as it will be at the target."""
+        return self._angle(pose, target) < _NEAR_ANGLE and abs(self._roll_error(pose)) < _NEAR_ROLL
+
     def _grasp_point(self, pose: FloatArray, target: FloatArray) -> FloatArray:
         """Where the tool goes, shape (3,), in base: to the target's centre, but neither palm nor fingers touch."""
         point = target - self._back_off(pose[:3, 2]) * pose[:3, 2]
@@ -248,8 +256,8 @@ class OraclePolicy:
         return np.array([*v, *w, roll])
 
     def _roll_error(self, pose: FloatArray) -> float:
-        """Level at first and for round targets, otherwise across the target's chosen axis, rad."""
-        if self._phase == "fixate" or self._grip < 0:
+        """Level for round targets, otherwise across the target's chosen axis, rad."""
+        if self._grip < 0:
             level = math.atan2(pose[2, 0], -pose[2, 1])
             return level * float(np.hypot(pose[2, 0], pose[2, 1]))
         across = pose[:3, :3].T @ self._rotation[:, self._grip]
