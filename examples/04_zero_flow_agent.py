@@ -9,7 +9,7 @@ import numpy as np
 
 import fixation_gym  # noqa: F401
 
-UNKNOWN = 128
+UNKNOWN = 128 / 255
 COLUMNS, ROWS = np.meshgrid(np.linspace(-1.0, 1.0, 32), np.linspace(-1.0, 1.0, 32))
 IN_THE_WAY = (np.abs(COLUMNS) < 0.6) & (ROWS > -0.3)  # roughly what the hand, below the camera, will sweep
 
@@ -17,7 +17,7 @@ IN_THE_WAY = (np.abs(COLUMNS) < 0.6) & (ROWS > -0.3)  # roughly what the hand, b
 def act(obs: Mapping[str, Any], step: int) -> np.ndarray:
     """Circle to see, approach what is fixated, keep away from what is in front, grasp when near and sure."""
     x, y, _, distance, std = obs["fixation"]
-    front = IN_THE_WAY * np.clip((obs["zfc_map"][0].astype(float) - UNKNOWN) / 127.0, 0.0, 1.0)
+    front = IN_THE_WAY * np.clip((obs["zfc_map"][0] - UNKNOWN) / (1.0 - UNKNOWN), 0.0, 1.0)
     blocked = front.sum() > 8.0
     velocity = 0.25 * np.array([math.sin(0.08 * step), math.cos(0.08 * step), 0.0])
     if blocked:
@@ -37,7 +37,7 @@ def main(scenario: str = "opaque", seed: int = 2) -> bool:
     done, step = False, 0
     while not done:
         if step % 25 == 0:
-            front = np.mean(obs["zfc_map"] > UNKNOWN)
+            front = np.mean(obs["zfc_map"] > UNKNOWN + 1e-3)
             print(f"{step / 25:4.0f} s  distance {obs['fixation'][3]:.3f} m  {100 * front:3.0f} % of the map in front")
         obs, _, terminated, truncated, info = env.step(act(obs, step))
         done, step = terminated or truncated, step + 1

@@ -21,7 +21,7 @@ def main(agent: Path = AGENT, scenario: str = "clear", seed: int = 1) -> bool:
     while not done:
         action = policy.act(obs)
         if step % 25 == 0:
-            front = (obs["zfc_map"] > 128).mean()
+            front = (obs["zfc_map"] > 0.51).mean()
             phase = policy.estimate.phase if policy.estimate else ""
             print(f"{step / 25:4.0f} s  {phase:8}  {obs['fixation'][3]:.3f} m  {front:4.0%} of the map in front")
         obs, _, terminated, truncated, info = env.step(action)

@@ -13,4 +13,4 @@ if find_spec("gymnasium"):
 
     _MAX_STEPS = round(EPISODE_SECONDS * CONTROL_FREQUENCY)
     register("FixationPick-v0", "fixation_gym.envs.pick_env:FixationPickEnv", max_episode_steps=_MAX_STEPS)
-    register("FixationPickZFC-v0", "fixation_gym.envs.zfc_env:make_zfc_env", max_episode_steps=_MAX_STEPS)
+    register("FixationPickZFC-v0", "fixation_gym.envs.zfc_env:FixationPickZFC", max_episode_steps=_MAX_STEPS)

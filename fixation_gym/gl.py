@@ -38,6 +38,11 @@ with mujoco.Renderer(model, 16, 16) as renderer:
     assert renderer.render().max() > 0
 """
 
+_SOFTWARE = ("llvmpipe", "softpipe")
+"""In the names of Mesa's software renderers."""
+_first_process: int | None = None
+_renderer_name = ""
+
 
 class MissingGLError(RuntimeError):
     """No GL library renders here. The message is one line that names what to install."""
@@ -69,12 +74,53 @@ def select_backend() -> str:
             f"no GL library renders here; on Debian or Ubuntu: apt-get install {' '.join(DEBIAN_PACKAGES)}"
         )
     os.environ.update(backend_environment(backend), **{_CHECKED: backend})
-    # Mesa's software renderer: cheaper blends between a texture's resolutions, a fifth of the time of a picture.
+    # Mesa's software renderer: threads of its own do not live on in a forked process, which then waits for them for
+    # ever, and at the sizes of a wrist camera they save little.
+    os.environ.setdefault("LP_NUM_THREADS", "0")
+    # Cheaper blends between a texture's resolutions save a fifth of the time of a picture.
     os.environ.setdefault("GALLIVM_PERF", "brilinear,rho_approx")
     if _CONTEXT_MODULE in sys.modules:
         # MuJoCo was imported first and may have taken its default, a window; now it reads MUJOCO_GL again.
         importlib.reload(sys.modules[_CONTEXT_MODULE])
     return backend
+
+
+def note_context() -> None:
+    """Remember who renders and with what, for processes forked later; call it where a GL context is current."""
+    from OpenGL import GL  # chooses its platform when imported, so not before the backend is selected
+
+    global _first_process, _renderer_name
+    if _first_process is None:
+        _first_process = os.getpid()
+        _renderer_name = str(GL.glGetString(GL.GL_RENDERER), "ascii", "replace")  # pyright: ignore[reportArgumentType]
+
+
+def renderer_name() -> str:
+    """What the GL library says that it renders with; empty before the first context."""
+    return _renderer_name
+
+
+def require_own_context() -> None:
+    """Check that this process may open a GL context.
+
+    Raises:
+        RuntimeError: if it was forked from one that has rendered, and GL would not work in it.
+    """
+    forked = _first_process not in (None, os.getpid())
+    in_software = any(name in _renderer_name for name in _SOFTWARE)
+    if forked and not (in_software and os.environ.get("LP_NUM_THREADS") == "0"):
+        raise RuntimeError(
+            f"a process forked from one that has rendered cannot render with {_renderer_name}: start workers by spawn, "
+            'as with gym.make_vec(..., vector_kwargs={"context": "spawn"}), or fork before the first reset'
+        )
+
+
+def release_context() -> None:
+    """Leave this thread without a GL context, so that another thread may render with it."""
+    if os.environ.get("MUJOCO_GL") == "egl":
+        from mujoco import egl
+
+        egl.EGL.eglMakeCurrent(egl.EGL_DISPLAY, egl.EGL.EGL_NO_SURFACE, egl.EGL.EGL_NO_SURFACE, egl.EGL.EGL_NO_CONTEXT)
 
 
 def renders(backend: str) -> bool:

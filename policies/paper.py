@@ -40,27 +40,31 @@ _IN_FRONT = 0.5
 
 @dataclass(frozen=True)
 class PaperGains:
-    """Gains of Eqs. 6-8; velocities are of the camera."""
+    """Gains of Eqs. 6-8; velocities are of the camera.
 
-    gaze_gain: float = 6.0
+    The best of 48 drawn at random, after 397 episodes of ``clear``, ``opaque``, ``shelf`` and ``screen`` (seeds 9310000
+    to 9310007): it picked in 24 of its 32.
+    """
+
+    gaze_gain: float = 14.2
     """lambda_XY of Eq. 6, 1/s."""
-    approach_gain: float = 0.10
+    approach_gain: float = 0.044
     """lambda_Z of Eq. 7, m/s."""
-    desired_distance: float = 0.17
+    desired_distance: float = 0.16
     """Z_d, m: from here the grasp is open loop."""
-    distance_gain: tuple[float, float] = (0.0, -0.15)
+    distance_gain: tuple[float, float] = (0.0, -0.126)
     """lambda_dist of Eq. 8 along x and y of the camera, 1/s: far from the target it climbs."""
-    uncertainty: float = 3.0
+    uncertainty: float = 2.85
     """k: standard deviations of Z_f that count as distance."""
-    cycle_amplitude: float = 0.02
+    cycle_amplitude: float = 0.019
     """Radius of the circle of Eq. 8, m."""
-    cycle_rate: float = 2.0
+    cycle_rate: float = 1.6
     """Its angular rate, rad/s."""
-    obstacle_gain: float = 0.3
+    obstacle_gain: float = 0.14
     """lambda_obs of Eq. 8, m/s per unit of normalised image coordinates."""
-    grasp_tolerance: float = 1.05
+    grasp_tolerance: float = 1.085
     """The grasp starts below this multiple of Z_d ..."""
-    grasp_relative_std: float = 0.1
+    grasp_relative_std: float = 0.25
     """... if the distance is known to this share."""
 
 

@@ -157,8 +157,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
 
         Raises:
             ValueError: if the action has the wrong shape or holds NaN or infinity.
+            gymnasium.error.ResetNeeded: before the first reset, and after ``close``.
         """
         action = checked_action(action, 7)
+        self._require_reset()
         sim = self.sim
         latency = round(self.noise.image_latency_s / sim.model.opt.timestep)
         exposed, hit = sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]), sim.substeps - latency)
@@ -177,6 +179,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         if self.render_mode is None:
             gym.logger.warn('render() needs render_mode="rgb_array" or "human" in gym.make')
             return None
+        self._require_reset()
         qpos = self.sim.data.qpos
         if self.render_mode == "human":
             if self._window is None:
@@ -192,7 +195,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         return np.ascontiguousarray(np.hstack([wrist, self._image("front", qpos)]))
 
     def close(self) -> None:
-        """Free GL contexts, windows and the simulation; may be called twice. A reset would build them again."""
+        """Free GL contexts, windows and the simulation; may be called twice. A reset builds them again."""
         for view in self._views.values():
             view.close()
         self._views = {}
@@ -200,6 +203,10 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             self._window.close()
             self._window = None
         self._sim = None
+
+    def _require_reset(self) -> None:
+        if self._sim is None or self.scene is None:
+            raise gym.error.ResetNeeded("call reset() first: after gym.make, and again after close()")
 
     # -- for checkers, privileged policies and experiments -------------------------------------------------------
 

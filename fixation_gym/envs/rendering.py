@@ -14,6 +14,7 @@ import cv2
 import mujoco
 import numpy as np
 
+from fixation_gym import gl
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.types import FloatArray, ImageArray
 
@@ -22,7 +23,10 @@ _WALL_TOP, _FARTHEST_WALL = 2.95, 5.2
 
 
 class View:
-    """One camera of the model, rendered off screen at a fixed size. Create lazily: it owns a GL context."""
+    """One camera of the model, rendered off screen at a fixed size. Create lazily: it owns a GL context.
+
+    Any thread may render, one at a time.
+    """
 
     def __init__(
         self, model: Any, camera: str, height: int, width: int, *, full_quality: bool, supersampling: int = 2
@@ -37,7 +41,11 @@ class View:
             full_quality: with robot and shadows, for people; otherwise what the wrist camera needs.
             supersampling: pixels rendered per pixel of the image along each side, without ``full_quality``; 1 is faster
                 and enough where all edges of interest are inside textures.
+
+        Raises:
+            RuntimeError: in a process forked from one that has rendered, where GL would wait for ever.
         """
+        gl.require_own_context()
         # Perception needs anti-aliasing: without it static edges flicker and read as motion. In software GL, twice the
         # resolution averaged down costs less than four samples per pixel; people get both samples and shadows.
         self._size = (height, width)
@@ -50,6 +58,7 @@ class View:
         if not full_quality:  # boxes are lit at corners of so many quads along a side: more show in highlights only
             model.vis.quality.numquads = min(model.vis.quality.numquads, 2)
         self._renderer = mujoco.Renderer(model, *fine)
+        gl.note_context()
         if factor > 1:
             _take_nearest_texels(self._renderer, model)
         self._pixels = np.empty((*fine, 3), np.uint8)
@@ -64,8 +73,9 @@ class View:
         self._full_quality = full_quality
         self._camera_id = model.camera(camera).id
         self._border = _border_rays(math.radians(model.cam_fovy[self._camera_id]), width / height)
+        gl.release_context()
         # Freed before EGL shuts down, which MuJoCo registered when it made the context; later, EGL complains.
-        atexit.register(self.close)
+        atexit.register(self._close_at_exit)
 
     @property
     def renderer(self) -> mujoco.Renderer:
@@ -87,6 +97,7 @@ class View:
         # The sky costs a millisecond even where it is hidden. A mirror may show it from anywhere.
         flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = int(self._full_quality or with_reflections or self._looks_up())
         self._renderer.render(out=self._pixels)
+        gl.release_context()
         height, width = self._size
         if self._full_quality:
             return self._pixels.copy()
@@ -100,8 +111,17 @@ class View:
 
     def close(self) -> None:
         """Free the GL context; may be called twice."""
-        atexit.unregister(self.close)
+        atexit.unregister(self._close_at_exit)
         self._renderer.close()
+
+    def _close_at_exit(self) -> None:
+        """Free the GL context, unless another library, such as robosuite, has shut EGL down and it with that."""
+        try:
+            self.close()
+        except Exception:  # PyOpenGL's, which may be unloaded by now
+            if self._renderer._gl_context is not None:
+                self._renderer._gl_context._context = None
+            self._renderer._gl_context = self._renderer._mjr_context = None
 
 
 def _take_nearest_texels(renderer: mujoco.Renderer, model: Any) -> None:

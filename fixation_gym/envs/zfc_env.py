@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.envs.registration import EnvSpec
 
 from fixation_gym.control.open_loop import OpenLoopGains
 from fixation_gym.envs.arguments import checked_action, require_choice
+from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE
 from fixation_gym.envs.pick_env import FixationPickEnv
+from fixation_gym.envs.rewards import RewardWeights
 from fixation_gym.envs.zfc_observation import (
     OBSERVATIONS,
     fixation_vector,
+    map_levels,
     proprio_vector,
     zfc_observation_space,
 )
@@ -27,20 +29,7 @@ from fixation_gym.types import Observation
 _GAINS = FixatorGains(open_loop=OpenLoopGains(hold_seconds=3.0))
 
 
-def make_zfc_env(observation: str = "zfc", **arguments: Any) -> FixationPickZFC:
-    """Entry point of ``FixationPickZFC-v0``.
-
-    Args:
-        observation: "zfc", "blind", "rgb" or "privileged".
-        arguments: those of ``FixationPickEnv``; ``image_size`` may not be None.
-
-    Raises:
-        ValueError: for a value that is not allowed; the message says what is.
-    """
-    return FixationPickZFC(FixationPickEnv(**arguments), observation)
-
-
-class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np.ndarray]):
+class FixationPickZFC(FixationPickEnv):
     """``FixationPick-v0`` for learners: perception, gaze and grasp run inside, the agent chooses the way.
 
     **Action** ``Box(-1, 1, (4,), float32)``; values outside are clipped.
@@ -66,10 +55,10 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
 
     | key | shape | meaning |
     |---|---|---|
-    | ``zfc_map`` ("zfc") | (1, 32, 32) uint8 | P(nearer than the fixated object) * 255; 128 = unknown |
+    | ``zfc_map`` ("zfc") | (1, 32, 32) float32 | P(nearer than the fixated object), 0..1; 128/255 = unknown |
     | nothing ("blind") | | |
     | ``rgb`` ("rgb") | (H, W, 3) uint8 | wrist image |
-    | ``true_map`` ("privileged") | (1, 32, 32) uint8 | share of the cell truly nearer than the object * 255 |
+    | ``true_map`` ("privileged") | (1, 32, 32) float32 | share of the cell truly nearer than the object, 0..1 |
     | ``fixation`` | (5,) float32 | centroid x, y (normalised image coordinates), visible, distance m, its std m |
     | ``proprio`` | (24,) float32 | see below |
 
@@ -81,67 +70,94 @@ class FixationPickZFC(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np
     | 19 | opening between the finger pads | m |
     | 20-23 | stage of the manoeuvre: grasp, close, lift, recover; one is 1, or all 0 when the next action counts | - |
 
-    Everything but ``true_map`` comes from the sensors. Rewards, end, ``info`` and rendering are those of
-    ``FixationPick-v0``. See ``make_zfc_env`` for arguments.
+    Everything but ``true_map`` comes from the sensors. Maps are numbers and no images, for libraries have nets for
+    images that a map is too small for. Rewards, end, ``info`` and rendering are those of ``FixationPick-v0``.
     """
 
-    def __init__(self, env: FixationPickEnv, observation: str = "zfc") -> None:
-        """Wrap the environment; ``gymnasium.make`` does it by way of ``make_zfc_env``.
+    def __init__(
+        self,
+        scenario: str | Mapping[str, Any] = "clear",
+        observation: str = "zfc",
+        image_size: tuple[int, int] = IMAGE_SIZE,
+        sensor_noise: str = "nominal",
+        control_frequency: int = CONTROL_FREQUENCY,
+        render_mode: str | None = None,
+        render_view: str = "front",
+        reward: str = "dense",
+        reward_weights: RewardWeights | Mapping[str, float] | None = None,
+    ) -> None:
+        """Check the arguments; the simulation itself is built at the first reset.
+
+        Args:
+            scenario: as in ``FixationPickEnv``, like all that follow but for two:
+            observation: "zfc", "blind", "rgb" or "privileged".
+            image_size: (height, width) of the wrist image, px; may not be None, for perception works on it.
+            sensor_noise: "ideal", "nominal" or "conservative".
+            control_frequency: steps per second.
+            render_mode: None, "rgb_array" or "human".
+            render_view: of "rgb_array".
+            reward: "dense" or "sparse".
+            reward_weights: of the dense reward.
 
         Raises:
-            ValueError: for an unknown ``observation``, or if the environment renders no wrist image.
+            ValueError: for a value that is not allowed; the message says what is.
         """
         require_choice("observation", observation, OBSERVATIONS)
-        super().__init__(env)
-        self._base = env
-        if "rgb" not in env.observation_space.keys():  # noqa: SIM118  # pyright: ignore[reportAttributeAccessIssue]
+        if image_size is None:
             raise ValueError("FixationPickZFC-v0 needs an image_size: its perception works on the wrist image")
+        super().__init__(
+            scenario,
+            image_size,
+            sensor_noise,
+            control_frequency,
+            render_mode,
+            render_view,
+            reward,
+            reward_weights,
+        )
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
-        self.observation_space = zfc_observation_space(observation, (env.intrinsics.height, env.intrinsics.width))
+        self.observation_space = zfc_observation_space(observation, (self.intrinsics.height, self.intrinsics.width))
         self._shown = observation
-        detector = BoxTracker(env.intrinsics) if env.scenario.any_colour else None
+        detector = BoxTracker(self.intrinsics) if self.scenario.any_colour else None
         table = ROBOT.workspace.table_height
-        self._fixator = Fixator(Perception(env.intrinsics, support_height_m=table, detector=detector), _GAINS)
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """The inner environment's, since its entry point already makes this wrapper."""
-        return self.env.spec
+        self._fixator = Fixator(Perception(self.intrinsics, support_height_m=table, detector=detector), _GAINS)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Draw a new scene. ``options`` are not used."""
-        observation, info = self.env.reset(seed=seed, options=options)
+        sensed, info = super().reset(seed=seed, options=options)
         if self._shown == "privileged":
             from fixation_gym.envs.privileged_map import ObstacleDepth
 
-            self._truth = ObstacleDepth(self._base.wrist_view, self._base.model)
+            self._truth = ObstacleDepth(self.wrist_view, self.model)
         self._fixator.reset()
-        return self._observation(observation, info), info
+        return self._perceived(sensed, info), info
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Run one control period.
 
         Raises:
             ValueError: if the action has the wrong shape or holds NaN or infinity.
+            gymnasium.error.ResetNeeded: before the first reset, and after ``close``.
         """
         action = checked_action(action, 4)
+        self._require_reset()
         command = self._fixator.steer(action[:3] * ROBOT.arm.linear_speed, grasp=bool(action[3] > 0.0))
-        observation, reward, terminated, truncated, info = self.env.step(action_of(command))
-        return self._observation(observation, info), float(reward), terminated, truncated, info
+        sensed, reward, terminated, truncated, info = super().step(action_of(command))
+        return self._perceived(sensed, info), reward, terminated, truncated, info
 
-    def _observation(self, outer: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
+    def _perceived(self, sensed: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
         """What the learner sees, for the observation and info of ``FixationPick-v0``."""
-        reading, fixator = Observation.from_dict(outer), self._fixator
-        self._base.percept = percept = fixator.look(reading, fresh=self._base.camera_on)
+        reading, fixator = Observation.from_dict(sensed), self._fixator
+        self.percept = percept = fixator.look(reading, fresh=self.camera_on)
         observation: dict[str, Any] = {}
         if self._shown == "zfc":
-            observation["zfc_map"] = percept.zfc.cells[None].copy()
+            observation["zfc_map"] = map_levels(percept.zfc.cells)
         elif self._shown == "rgb":
             observation["rgb"] = reading.rgb
         elif self._shown == "privileged":
-            observation["true_map"] = self._truth.nearer(self._base.data, info["distance_true_m"])[None]
+            observation["true_map"] = map_levels(self._truth.nearer(self.data, info["distance_true_m"]))
         observation["fixation"] = fixation_vector(percept.fixation)
         observation["proprio"] = proprio_vector(reading, fixator.T_base_cam, fixator.stage)
         return observation

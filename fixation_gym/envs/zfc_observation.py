@@ -13,7 +13,7 @@ from fixation_gym.envs.arguments import WIDEST
 from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.robots import ROBOT
-from fixation_gym.types import FloatArray, Observation
+from fixation_gym.types import FloatArray, ImageArray, Observation
 
 OBSERVATIONS = ("zfc", "blind", "rgb", "privileged")
 """What the learner gets beside ``fixation`` and ``proprio``."""
@@ -30,7 +30,7 @@ _PROPRIO = spaces.Box(_PROPRIO_LOW, _PROPRIO_HIGH)
 
 def zfc_observation_space(observation: str, image_size: tuple[int, int]) -> spaces.Dict:
     """Space of the observation; ``observation`` is one of ``OBSERVATIONS``, ``image_size`` (height, width) in px."""
-    cells = spaces.Box(0, 255, (1, CELLS, CELLS), np.uint8)
+    cells = spaces.Box(0.0, 1.0, (1, CELLS, CELLS), np.float32)
     views: dict[str, dict[str, spaces.Space[Any]]] = {
         "zfc": {"zfc_map": cells},
         "blind": {},
@@ -38,6 +38,11 @@ def zfc_observation_space(observation: str, image_size: tuple[int, int]) -> spac
         "privileged": {"true_map": cells},
     }
     return spaces.Dict({**views[observation], "fixation": _FIXATION, "proprio": _PROPRIO})
+
+
+def map_levels(cells: ImageArray) -> NDArray[np.float32]:
+    """A map as learners get it, shape (1, 32, 32), 0..1, from one of grey levels, shape (32, 32)."""
+    return cells[None].astype(np.float32) / np.float32(255.0)
 
 
 def fixation_vector(fixation: Fixation) -> NDArray[np.float32]:

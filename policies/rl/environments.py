@@ -65,8 +65,8 @@ def draw_new_scenes(envs: SubprocVecEnv, config: TrainConfig, decisions: int) ->
 
 
 def _spawn(makers: list[Callable[[], gym.Env[Any, Any]]]) -> SubprocVecEnv:
-    # Inherited by the workers. More threads than cores only get into each other's way, software rendering's included.
-    for variable in ("OMP_NUM_THREADS", "LP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    # Inherited by the workers. More threads than cores only get into each other's way.
+    for variable in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     from fixation_gym.gl import select_backend
 

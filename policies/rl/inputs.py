@@ -65,7 +65,7 @@ def remember(memory: Memory | None, obs: Mapping[str, Any]) -> Memory | None:
         return np.concatenate([image, mean])
     for key in ("zfc_map", "true_map"):
         if key in obs:
-            cells = (obs[key].astype(np.float32) - 128.0) / 127.0
+            cells = (255.0 * obs[key] - 128.0) / np.float32(127.0)
             before = np.zeros_like(cells) if memory is None else memory[1:]
             return np.concatenate([cells, np.clip(_LEAK * before + _GAIN * cells, -1.0, 1.0)])
     return None

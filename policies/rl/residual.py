@@ -14,7 +14,7 @@ from fixation_gym.control import gaze, servo_laws
 from fixation_gym.control.gaze import GazeGains
 from fixation_gym.control.open_loop import Stage
 from fixation_gym.envs.pick_env import FixationPickEnv
-from fixation_gym.envs.zfc_observation import fixation_vector, proprio_vector, zfc_observation_space
+from fixation_gym.envs.zfc_observation import fixation_vector, map_levels, proprio_vector, zfc_observation_space
 from fixation_gym.geometry.rigid import pose_to_matrix
 from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.percept import Percept
@@ -51,7 +51,7 @@ class ResidualServo:
         self._T_base_cam = pose_to_matrix(reading.camera_pose)
         stage = _STAGES.get(self.phase)
         return {
-            "zfc_map": self._percept.zfc.cells[None].copy(),
+            "zfc_map": map_levels(self._percept.zfc.cells),
             "fixation": fixation_vector(self._percept.fixation),
             "proprio": proprio_vector(reading, self._T_base_cam, stage),
         }

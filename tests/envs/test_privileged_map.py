@@ -5,7 +5,7 @@ import pytest
 
 from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.envs.privileged_map import nearer_map
-from fixation_gym.envs.zfc_env import make_zfc_env
+from fixation_gym.envs.zfc_env import FixationPickZFC
 
 pytestmark = pytest.mark.sim
 SIZE = (96, 128)
@@ -23,14 +23,14 @@ def test_cells_hold_the_share_that_is_nearer():
 def test_obstacles_are_seen_at_their_distance_whatever_they_are_made_of_and_nothing_else_is():
     kinds = ("mirror", "opaque", "translucent")
     scenario = {"obstacle_materials": kinds, "obstacle_count": (2, 6), "alpha": (0.3, 0.3)}
-    env = make_zfc_env("privileged", scenario=scenario, image_size=SIZE)
-    base, looked = env.unwrapped, set()
+    env = FixationPickZFC(scenario, "privileged", image_size=SIZE)
+    looked = set()
     for seed in range(32):
         obs, info = env.reset(seed=seed)
-        pose = base.sim.arm_state().camera_pose
-        depth = env._truth.depth(base.data)
-        camera = base.intrinsics.scaled(*depth.shape)
-        for obstacle in base.scene.obstacles:
+        pose = env.sim.arm_state().camera_pose
+        depth = env._truth.depth(env.data)
+        camera = env.intrinsics.scaled(*depth.shape)
+        for obstacle in env.scene.obstacles:
             if obstacle.shape.name != "thing":
                 continue  # the middle of others may be hollow
             centre = pose[:3, :3].T @ (np.array(obstacle.position) - pose[:3, 3])
@@ -43,7 +43,7 @@ def test_obstacles_are_seen_at_their_distance_whatever_they_are_made_of_and_noth
             if depth[row, column] < info["distance_true_m"]:
                 assert obs["true_map"][0, row * 32 // camera.height, column * 32 // camera.width] > 0
     assert looked == set(kinds)
-    base.scenario = SCENARIOS["clear"]
+    env.scenario = SCENARIOS["clear"]
     obs, _ = env.reset(seed=0)
     assert not obs["true_map"].any()
     env.close()

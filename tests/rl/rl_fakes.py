@@ -42,7 +42,7 @@ class FakeZFC(gym.Env):
         proprio = np.zeros(24, np.float32)
         if self.left:
             proprio[20 + (12 - self.left) // 3] = 1.0
-        cells = np.full((1, 32, 32), self.level, np.uint8)
+        cells = np.full((1, 32, 32), self.level / 255.0, np.float32)
         return {"zfc_map": cells, "fixation": np.array([0, 0, 1, 0.4, 0.01], np.float32), "proprio": proprio}
 
     def _info(self):

@@ -13,7 +13,7 @@ def zfc_obs(cells, stage=None):
     if stage is not None:
         proprio[20 + stage] = 1.0
     fixation = np.array([0.01, -0.02, 1.0, 0.4, 0.01], np.float32)
-    return {"zfc_map": np.full((1, 32, 32), cells, np.uint8), "fixation": fixation, "proprio": proprio}
+    return {"zfc_map": np.full((1, 32, 32), cells / 255.0, np.float32), "fixation": fixation, "proprio": proprio}
 
 
 def seen(*maps):

@@ -1,0 +1,172 @@
+"""The environments under the libraries that people use, unchanged."""
+
+import os
+import subprocess
+import sys
+import threading
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import fixation_gym  # noqa: F401
+from fixation_gym import gl
+from fixation_gym.envs.pick_env import FixationPickEnv
+from fixation_gym.envs.zfc_env import FixationPickZFC
+
+pytestmark = pytest.mark.sim
+SMALL = (64, 80)
+
+
+def python(code):
+    """What a fresh process prints and complains about; it has two minutes."""
+    inherited = {key: value for key, value in os.environ.items() if key != "LP_NUM_THREADS"}
+    return subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=inherited,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("algorithm", ["PPO", "SAC"])
+def test_stable_baselines_learns_on_the_map_with_its_own_policy(algorithm):
+    import stable_baselines3
+
+    arguments = {"PPO": {"n_steps": 8, "batch_size": 8}, "SAC": {"learning_starts": 4, "buffer_size": 50}}[algorithm]
+    env = gym.make("FixationPickZFC-v0", image_size=SMALL)
+    model = getattr(stable_baselines3, algorithm)("MultiInputPolicy", env, **arguments)
+    before = model.policy.state_dict()["action_net.bias" if algorithm == "PPO" else "actor.mu.bias"].clone()
+    model.learn(12)
+    after = model.policy.state_dict()["action_net.bias" if algorithm == "PPO" else "actor.mu.bias"]
+    assert not np.array_equal(before.numpy(), after.numpy())
+    env.close()
+
+
+def test_the_unwrapped_environment_has_the_same_spaces():
+    env = gym.make("FixationPickZFC-v0", image_size=SMALL)
+    assert isinstance(env.unwrapped, FixationPickZFC)
+    assert env.unwrapped.action_space == env.action_space
+    assert env.unwrapped.observation_space == env.observation_space
+
+
+def test_lists_of_frames_are_rendered_by_both_ids():
+    for name in ("FixationPick-v0", "FixationPickZFC-v0"):
+        env = gym.make(name, image_size=SMALL, render_mode="rgb_array_list")
+        env.reset(seed=0)
+        env.step(env.action_space.sample())
+        frames = env.render()
+        assert len(frames) == 2
+        assert frames[0].ndim == 3
+        env.close()
+
+
+FORKED = """
+import gymnasium as gym, fixation_gym
+if __name__ == "__main__":
+    env = gym.make("FixationPick-v0", image_size=(64, 80))
+    here, _ = env.reset(seed=3)
+    workers = gym.make_vec("FixationPick-v0", num_envs=2, vectorization_mode="async", image_size=(64, 80))
+    there, _ = workers.reset(seed=3)
+    print((there["rgb"][0] == here["rgb"]).all())
+    workers.close()
+"""
+
+
+def test_workers_forked_after_the_parent_rendered_see_the_same():
+    result = python(FORKED)
+    assert result.stdout.splitlines()[-1:] == ["True"], result.stderr
+
+
+@pytest.mark.parametrize(("renderer", "threads"), [("llvmpipe (LLVM)", "2"), ("NVIDIA", "0")])
+def test_where_a_forked_process_would_wait_for_ever_it_says_how_not_to(monkeypatch, renderer, threads):
+    monkeypatch.setattr(gl, "_first_process", 1)
+    monkeypatch.setattr(gl, "_renderer_name", renderer)
+    monkeypatch.setenv("LP_NUM_THREADS", threads)
+    env = FixationPickEnv(image_size=SMALL)
+    with pytest.raises(RuntimeError, match=r'start workers by spawn, as with .*"context": "spawn"'):
+        env.reset(seed=0)
+    env.close()
+
+
+def test_any_thread_may_step():
+    env = gym.make("FixationPick-v0", image_size=SMALL)
+    env.reset(seed=0)
+    seen = []
+    for _ in range(2):
+        thread = threading.Thread(target=lambda: seen.append(env.step(np.zeros(7, np.float32))[0]["rgb"]))
+        thread.start()
+        thread.join()
+        seen.append(env.step(np.zeros(7, np.float32))[0]["rgb"])
+    assert len(seen) == 4
+    assert all(image.std() > 10 for image in seen)
+    env.close()
+
+
+def test_two_environments_each_in_a_thread_see_what_they_see_alone():
+    def walk(env, seed, seen):
+        obs, _ = env.reset(seed=seed)
+        for _ in range(5):
+            obs, *_ = env.step(np.full(7, 0.2, np.float32))
+        seen[seed] = obs["rgb"]
+
+    envs = [FixationPickEnv("opaque", image_size=SMALL) for _ in range(2)]
+    alone, together = {}, {}
+    for seed, env in enumerate(envs):
+        walk(env, seed, alone)
+    threads = [threading.Thread(target=walk, args=(env, seed, together)) for seed, env in enumerate(envs)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for seed, env in enumerate(envs):
+        np.testing.assert_array_equal(together[seed], alone[seed])
+        env.close()
+
+
+def test_an_environment_left_open_beside_robosuites_ends_without_a_word():
+    code = """
+import gymnasium as gym, robosuite, fixation_gym
+env = gym.make("FixationPick-v0", image_size=(64, 80)); env.reset(seed=0)
+other = robosuite.make("Lift", robots="Panda", has_renderer=False, has_offscreen_renderer=True, use_camera_obs=True,
+                       camera_heights=64, camera_widths=64)
+other.reset()
+"""
+    result = python(code)
+    assert result.returncode == 0, result.stderr
+    assert "Error" not in result.stderr
+
+
+@pytest.mark.parametrize("make", [FixationPickEnv, FixationPickZFC])
+def test_a_step_before_the_reset_or_after_the_end_says_so(make):
+    env = make(image_size=SMALL)
+    action = env.action_space.sample()
+    with pytest.raises(gym.error.ResetNeeded, match="call reset"):
+        env.step(action)
+    env.reset(seed=0)
+    env.step(action)
+    env.close()
+    with pytest.raises(gym.error.ResetNeeded, match="again after close"):
+        env.step(action)
+
+
+def test_scenes_do_not_depend_on_how_long_the_episodes_before_were():
+    env = FixationPickEnv("opaque", image_size=SMALL)
+    scenes = []
+    for steps in (3, 17):
+        env.reset(seed=1)
+        for _ in range(steps):
+            env.step(env.action_space.sample())
+        env.reset()
+        scenes.append(env.scene)
+    assert scenes[0] == scenes[1]
+    env.close()
+
+
+def test_the_renderer_has_a_name():
+    env = FixationPickEnv(image_size=SMALL)
+    env.reset(seed=0)
+    assert gl.renderer_name()
+    env.close()
