@@ -3,7 +3,7 @@
 import gymnasium as gym
 
 import fixation_gym  # noqa: F401
-from policies.catalogue import make_policy
+from fixation_policies.catalogue import make_policy
 
 
 def main(scenario: str = "opaque", seed: int = 1) -> bool:

@@ -11,7 +11,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
-from policies.catalogue import make_policy
+from fixation_policies.catalogue import make_policy
 
 
 def record(path: Path, steps: int = 60) -> None:

@@ -5,9 +5,10 @@ from pathlib import Path
 import gymnasium as gym
 
 import fixation_gym  # noqa: F401
-from policies.catalogue import make_policy, surroundings
+from fixation_policies import agents
+from fixation_policies.catalogue import make_policy, surroundings
 
-AGENT = Path(__file__).parents[1] / "policies" / "agents" / "zfc.zip"
+AGENT = Path(agents.__file__).parent / "zfc.zip"
 
 
 def main(agent: Path = AGENT, scenario: str = "clear", seed: int = 1) -> bool:

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 import fixation_gym  # noqa: F401
-from policies.catalogue import make_policy
+from fixation_policies.catalogue import make_policy
 
 COLOURS = {"search": (160, 160, 160), "fixate": (60, 140, 255), "approach": (40, 200, 80), "grasp": (240, 90, 40)}
 ENLARGED = 2

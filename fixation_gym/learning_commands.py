@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fixation_gym.gl import select_backend
 from fixation_gym.names import Names
-from policies.rl.config import TrainConfig, require_learning_packages
+from fixation_policies.rl.config import TrainConfig, require_learning_packages
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Train(TrainConfig):
         self.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from policies.rl.train import BEST_FILE, FINAL_FILE, train
+        from fixation_policies.rl.train import BEST_FILE, FINAL_FILE, train
 
         summary = train(self, self.out, self.resume)
         rates = summary["final"]
@@ -68,8 +68,8 @@ class Compare:
     def run(self) -> int:
         """Compare and print the table."""
         require_learning_packages()
-        from policies.rl.compare import QUICK, CompareConfig, compare
-        from policies.rl.comparison_tables import (
+        from fixation_policies.rl.compare import QUICK, CompareConfig, compare
+        from fixation_policies.rl.comparison_tables import (
             CURVES_FILE,
             DIFFERENCES_FILE,
             FIGURE_FILE,

@@ -46,7 +46,7 @@ class Ablate:
 
     def run(self) -> int:
         """Evaluate and print the table."""
-        from policies.servo.variants import VARIANT_NAMES, VARIANTS
+        from fixation_policies.servo.variants import VARIANT_NAMES, VARIANTS
 
         names = self.variant or VARIANT_NAMES
         check_names(names, VARIANT_NAMES, "variant")
@@ -91,7 +91,7 @@ class Ladder:
     def run(self) -> int:
         """Evaluate and print the table."""
         from fixation_gym.envs.config import SCENARIOS
-        from policies.ladder import BESIDE, LADDER
+        from fixation_policies.ladder import BESIDE, LADDER
 
         red = tuple(name for name, item in SCENARIOS.items() if not item.any_colour)
         check_names(self.scenario or red, red, "scenario")

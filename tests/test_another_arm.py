@@ -22,7 +22,7 @@ robots.ROBOT = replace(
 )
 import gymnasium
 from fixation_gym.evaluation.rollout import run_episode
-from policies.catalogue import make_policy
+from fixation_policies.catalogue import make_policy
 
 env = gymnasium.make("FixationPick-v0", scenario="clear")
 result = run_episode(env, make_policy("servo", env), seed=3)

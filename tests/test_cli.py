@@ -14,7 +14,7 @@ from fixation_gym import cli, doctor, gl, learning_commands, report_commands
 from fixation_gym.evaluation import clips, demo, evaluate
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.reporting import ablation, ladder
-from policies.rl.config import TrainConfig
+from fixation_policies.rl.config import TrainConfig
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,7 @@ from fixation_gym.names import Names
 if TYPE_CHECKING:
     from fixation_gym.evaluation.storage import EpisodeKey
     from fixation_gym.evaluation.workers import Cell
-    from policies.catalogue import Surroundings
+    from fixation_policies.catalogue import Surroundings
 
 SEED_BLOCK = 100_000
 """Episode i of ``--seed S`` has seed S * SEED_BLOCK + i, in every scenario: policies meet the same scenes."""
@@ -56,7 +56,7 @@ class EvaluationConfig:
         """
         from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
         from fixation_gym.evaluation.workers import check_backend
-        from policies.catalogue import check_detector, check_policy
+        from fixation_policies.catalogue import check_detector, check_policy
 
         check_policy(self.policy)
         check_detector(self.detector, self.policy)
@@ -76,14 +76,14 @@ class EvaluationConfig:
     @property
     def surroundings(self) -> Surroundings:
         """Where the policy acts, with the image size that is asked for."""
-        from policies.catalogue import surroundings
+        from fixation_policies.catalogue import surroundings
 
         own = surroundings(self.policy)
         return own if self.image_size is None else replace(own, image_size=self.image_size)
 
     def run_description(self) -> dict[str, Any]:
         """Everything the result of one episode depends on, apart from its scenario and seed."""
-        from policies.catalogue import source_hashes
+        from fixation_policies.catalogue import source_hashes
 
         surroundings = self.surroundings
         return {

@@ -30,7 +30,7 @@ from fixation_gym.evaluation.storage import (
 )
 from fixation_gym.evaluation.video import VideoWriter, caption, contact_sheet, evenly_spaced, shrink, write_png
 from fixation_gym.types import ImageArray
-from policies.base import Policy
+from fixation_policies.base import Policy
 
 VIDEO_FILE = "demo.mp4"
 SHEET_FILE = "contact_sheet.png"

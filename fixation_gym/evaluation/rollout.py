@@ -15,7 +15,7 @@ from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.evaluation.scene_truth import scene_of
 from fixation_gym.evaluation.statistics import mean, minimum, root_mean_square
 from fixation_gym.evaluation.trace import Trace, TraceRecorder
-from policies.base import Estimate, Policy
+from fixation_policies.base import Estimate, Policy
 
 APPROACH = "approach"
 GRASP = "grasp"
@@ -105,8 +105,8 @@ def run_episode(
 
     Args:
         env: environment with the ``info`` keys of ``FixationPick-v0``.
-        policy: is reset with the same seed. If it has an attribute ``estimate`` (a ``policies.base.Estimate`` or None),
-            its distances are judged.
+        policy: is reset with the same seed. If it has an attribute ``estimate``, None or a
+            ``fixation_policies.base.Estimate``, its distances are judged.
         seed: of the environment's reset.
         on_frame: called with ``env.render()`` at decisions, after the policy has seen the observation, and at the end.
         scenario: name written to the result.

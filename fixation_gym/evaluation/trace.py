@@ -19,7 +19,7 @@ import numpy as np
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.files import write_file
 from fixation_gym.types import FloatArray, MaskArray
-from policies.base import Estimate
+from fixation_policies.base import Estimate
 
 TRACES_FOLDER = "traces"
 _UNIT = 1e-4

@@ -12,7 +12,7 @@ import gymnasium
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.rollout import run_episode
-from policies.base import Policy
+from fixation_policies.base import Policy
 
 BACKENDS = ("loky", "ray")
 
@@ -51,7 +51,7 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
         MissingGLError: if nothing can render here.
     """
     prepare_process()  # before the environment's module imports robosuite
-    from policies.catalogue import surroundings
+    from fixation_policies.catalogue import surroundings
 
     return gymnasium.make(
         cell["env_id"],
@@ -66,7 +66,7 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
 
 def make_policy(name: str, env: gymnasium.Env, detector: str | None = None) -> Policy:
     """Build a policy by its name, with a detector by its name."""
-    from policies import catalogue
+    from fixation_policies import catalogue
 
     return catalogue.make_policy(name, env, detector)
 

@@ -69,7 +69,7 @@ def test_any_colour_changes_looks_and_nothing_else():
 @pytest.mark.sim
 def test_the_servo_picks_what_the_box_names_whatever_its_colour():
     from fixation_gym.evaluation.rollout import run_episode
-    from policies.catalogue import make_policy
+    from fixation_policies.catalogue import make_policy
 
     env = gym.make("FixationPick-v0", scenario="any_colour")
     results = [run_episode(env, make_policy("servo", env), seed=seed) for seed in (8_900_000, 8_900_001, 8_900_003)]

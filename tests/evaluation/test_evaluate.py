@@ -128,7 +128,11 @@ def test_a_bad_value_is_an_error_that_says_what_is_allowed(config: EvaluationCon
 
 @pytest.mark.parametrize(
     ("policy", "asked", "size"),
-    [("servo", None, [240, 320]), ("policies/agents/zfc.zip", None, [96, 128]), ("servo", (64, 80), [64, 80])],
+    [
+        ("servo", None, [240, 320]),
+        ("policies/fixation_policies/agents/zfc.zip", None, [96, 128]),
+        ("servo", (64, 80), [64, 80]),
+    ],
 )
 def test_the_image_has_the_size_that_is_asked_for_or_the_policys_own(
     policy: str, asked: tuple[int, int] | None, size: list[int], monkeypatch: pytest.MonkeyPatch

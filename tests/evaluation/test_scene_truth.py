@@ -10,7 +10,7 @@ from evaluation_fakes import FakeEnv
 import fixation_gym  # noqa: F401
 from fixation_gym.evaluation.rollout import run_episode
 from fixation_gym.evaluation.scene_truth import scene_of
-from policies.baselines import RandomPolicy
+from fixation_policies.baselines import RandomPolicy
 
 
 def test_other_environments_have_no_scene() -> None:

@@ -38,8 +38,8 @@ from fixation_gym.experiments.necessity.statistics import chosen_ways, format_ta
 from fixation_gym.experiments.necessity.ways import ELEVATIONS, QUICK_WAYS, STRAIGHT, WAYS, azimuth_cells
 from fixation_gym.geometry.boxes import joined
 from fixation_gym.robots import ROBOT
-from policies import catalogue
-from policies.blind_ways import BlindWay
+from fixation_policies import catalogue
+from fixation_policies.blind_ways import BlindWay
 
 REACH = ROBOT.arm.reach
 SCENES = 12

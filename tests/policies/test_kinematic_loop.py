@@ -9,8 +9,8 @@ from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
-from policies.servo.gains import ServoGains
-from policies.servo.servo_policy import ServoPolicy
+from fixation_policies.servo.gains import ServoGains
+from fixation_policies.servo.servo_policy import ServoPolicy
 
 INTRINSICS = Intrinsics.from_fovy(120, 160, ROBOT.camera.fovy)
 TARGET = np.array([0.55, 0.0, 0.0])

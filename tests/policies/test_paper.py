@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from test_kinematic_loop import INTRINSICS, START, TARGET, run
 
-from policies.catalogue import POLICY_NAMES
-from policies.paper import PAPER_NAMES, PAPER_VARIANTS, PaperPolicy, centre_of_what_is_in_front, paper_variant
+from fixation_policies.catalogue import POLICY_NAMES
+from fixation_policies.paper import PAPER_NAMES, PAPER_VARIANTS, PaperPolicy, centre_of_what_is_in_front, paper_variant
 
 TABLE = -1.0
 

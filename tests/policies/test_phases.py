@@ -4,9 +4,9 @@ from dataclasses import replace
 import pytest
 
 from fixation_gym.control.open_loop import Stage
-from policies.servo.gains import ServoGains
-from policies.servo.phases import Phase, Situation, next_phase
-from policies.servo.variants import servo_variant
+from fixation_policies.servo.gains import ServoGains
+from fixation_policies.servo.phases import Phase, Situation, next_phase
+from fixation_policies.servo.variants import servo_variant
 
 GAINS = ServoGains()
 READY = Situation(

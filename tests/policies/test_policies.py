@@ -6,8 +6,8 @@ import pytest
 
 import fixation_gym  # noqa: F401
 from fixation_gym.evaluation.rollout import run_episode
-from policies.baselines import RandomPolicy
-from policies.catalogue import POLICY_NAMES, make_policy
+from fixation_policies.baselines import RandomPolicy
+from fixation_policies.catalogue import POLICY_NAMES, make_policy
 
 
 def play(env, policy, seed):

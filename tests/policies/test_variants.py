@@ -13,9 +13,9 @@ from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
-from policies.catalogue import POLICY_NAMES, make_policy
-from policies.servo.servo_policy import ServoPolicy
-from policies.servo.variants import VARIANT_NAMES, VARIANTS, servo_variant
+from fixation_policies.catalogue import POLICY_NAMES, make_policy
+from fixation_policies.servo.servo_policy import ServoPolicy
+from fixation_policies.servo.variants import VARIANT_NAMES, VARIANTS, servo_variant
 
 
 def test_every_variant_is_a_policy_and_the_full_servo_comes_first() -> None:

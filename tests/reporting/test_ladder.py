@@ -13,9 +13,9 @@ from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.statistics import paired_difference_interval
 from fixation_gym.reporting.ladder import FIGURE_FILE, LADDER_FILE, climb, format_ladder
-from policies.catalogue import POLICY_NAMES
-from policies.ladder import BESIDE, LADDER
-from policies.paper import PAPER_NAMES
+from fixation_policies.catalogue import POLICY_NAMES
+from fixation_policies.ladder import BESIDE, LADDER
+from fixation_policies.paper import PAPER_NAMES
 
 RUNGS = {"paper": "the start", "servo": "all the rest"}
 

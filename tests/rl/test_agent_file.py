@@ -12,9 +12,9 @@ import torch
 
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
-from policies import agents
-from policies.catalogue import surroundings
-from policies.rl.agent_file import AgentCard, read_agent, read_card, write_agent
+from fixation_policies import agents
+from fixation_policies.catalogue import surroundings
+from fixation_policies.rl.agent_file import AgentCard, read_agent, read_card, write_agent
 
 CARD = AgentCard("zfc", "sac", (96, 128), "mixed", 3, 1000, 9000, {"torch": "2"})
 WEIGHTS = {"layer.weight": torch.arange(6.0).reshape(2, 3)}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import trim_mean
 
-from policies.rl.aggregates import bootstrap_interval, interquartile_mean
+from fixation_policies.rl.aggregates import bootstrap_interval, interquartile_mean
 
 
 def test_the_interquartile_mean_leaves_out_a_quarter_at_each_end():

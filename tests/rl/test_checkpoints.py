@@ -15,13 +15,13 @@ from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.storage import RUN_FILE
-from policies.rl import train as training
-from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
-from policies.rl.config import TRAIN_SEEDS, TrainConfig
-from policies.rl.decisions import DecisionEnv, FixedEpisodes
-from policies.rl.environments import closing, draw_new_scenes, worker_deaths
-from policies.rl.overlap import BusyEnvs
-from policies.rl.train import agent_weights, make_model
+from fixation_policies.rl import train as training
+from fixation_policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
+from fixation_policies.rl.config import TRAIN_SEEDS, TrainConfig
+from fixation_policies.rl.decisions import DecisionEnv, FixedEpisodes
+from fixation_policies.rl.environments import closing, draw_new_scenes, worker_deaths
+from fixation_policies.rl.overlap import BusyEnvs
+from fixation_policies.rl.train import agent_weights, make_model
 
 CONFIG = TrainConfig(buffer_size=50)
 PPO_CONFIG = replace(CONFIG, algorithm="ppo")

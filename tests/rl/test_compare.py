@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from fixation_gym.errors import UsageError
-from policies.rl.compare import SERVO, CompareConfig, compare
-from policies.rl.comparison_tables import format_differences, format_table
-from policies.rl.config import TrainConfig
+from fixation_policies.rl.compare import SERVO, CompareConfig, compare
+from fixation_policies.rl.comparison_tables import format_differences, format_table
+from fixation_policies.rl.config import TrainConfig
 
 CONFIG = CompareConfig(configs=("zfc", "blind"), seeds=4, scenarios=("clear", "mixed"), episodes=10)
 SUCCESSES = {"zfc": (10, 8), "blind": (10, 5), SERVO: (9, 9)}

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from rl_fakes import FakeZFC
 
-from policies.rl.agent import Decider
-from policies.rl.decisions import PERIODS, DecisionEnv, FixedEpisodes, env_action
-from policies.rl.inputs import input_space
+from fixation_policies.rl.agent import Decider
+from fixation_policies.rl.decisions import PERIODS, DecisionEnv, FixedEpisodes, env_action
+from fixation_policies.rl.inputs import input_space
 
 GO, GRASP = np.array([0.3, 0, 0, 0], np.float32), np.array([0, 0, 0, 1], np.float32)
 

@@ -4,10 +4,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from policies.catalogue import make_policy
-from policies.rl.config import TrainConfig
-from policies.rl.environments import make_learner_env
-from policies.rl.residual import ResidualEnv
+from fixation_policies.catalogue import make_policy
+from fixation_policies.rl.config import TrainConfig
+from fixation_policies.rl.environments import make_learner_env
+from fixation_policies.rl.residual import ResidualEnv
 
 pytestmark = pytest.mark.sim
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fixation_gym.envs.zfc_observation import OBSERVATIONS, zfc_observation_space
-from policies.rl.inputs import busy, input_space, network_inputs, observation_name, remember
+from fixation_policies.rl.inputs import busy, input_space, network_inputs, observation_name, remember
 
 
 def zfc_obs(cells, stage=None):

@@ -10,12 +10,12 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
-from policies.rl import train as training
-from policies.rl.agent_file import read_card
-from policies.rl.checkpoints import latest_checkpoint, load_model
-from policies.rl.compare import CompareConfig, compare
-from policies.rl.config import TrainConfig
-from policies.rl.train import BEST_FILE, FINAL_FILE, TENSORBOARD_FOLDER, train
+from fixation_policies.rl import train as training
+from fixation_policies.rl.agent_file import read_card
+from fixation_policies.rl.checkpoints import latest_checkpoint, load_model
+from fixation_policies.rl.compare import CompareConfig, compare
+from fixation_policies.rl.config import TrainConfig
+from fixation_policies.rl.train import BEST_FILE, FINAL_FILE, TENSORBOARD_FOLDER, train
 
 pytestmark = pytest.mark.sim
 SHORT = TrainConfig(

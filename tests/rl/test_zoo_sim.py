@@ -10,9 +10,9 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 import fixation_gym  # noqa: F401  (registers the ids)
-from policies.rl.config import TrainConfig
-from policies.rl.inputs import input_space
-from policies.rl.zoo import ppo, sac
+from fixation_policies.rl.config import TrainConfig
+from fixation_policies.rl.inputs import input_space
+from fixation_policies.rl.zoo import ppo, sac
 
 pytestmark = pytest.mark.sim
 KINDS = {"sac": (sac, SAC), "ppo": (ppo, PPO)}

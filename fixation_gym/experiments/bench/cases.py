@@ -20,7 +20,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
-from policies.servo.servo_policy import ServoPolicy
+from fixation_policies.servo.servo_policy import ServoPolicy
 
 Size = tuple[int, int]
 """(height, width), px."""

@@ -18,7 +18,7 @@ from fixation_gym.names import Names
 if TYPE_CHECKING:
     from fixation_gym.evaluation.storage import EpisodeKey
     from fixation_gym.experiments.runner import Cell
-    from policies.blind_ways import BlindWay
+    from fixation_policies.blind_ways import BlindWay
 
 ORACLE = "oracle"
 QUICK_SCENARIOS = ("opaque", "screen", "clutter")
@@ -57,7 +57,7 @@ class NecessityConfig:
         """
         from fixation_gym.envs.config import SCENARIO_NAMES
         from fixation_gym.evaluation.workers import check_backend
-        from policies.catalogue import AGENT_SUFFIX, POLICY_NAMES, check_policy
+        from fixation_policies.catalogue import AGENT_SUFFIX, POLICY_NAMES, check_policy
 
         names = self.scenario_names
         check_names(names, SCENARIO_NAMES, "scenario")

@@ -15,7 +15,7 @@ from fixation_gym.envs import config
 from fixation_gym.envs.arguments import checked_action
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.robots import ROBOT
-from policies.base import Policy
+from fixation_policies.base import Policy
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim

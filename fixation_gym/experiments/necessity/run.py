@@ -71,8 +71,8 @@ def _run_without_images(cell: Cell) -> dict[str, Any]:
     from fixation_gym.envs.pick_sim import PickSim
     from fixation_gym.experiments.necessity.episodes import World, play
     from fixation_gym.experiments.necessity.ways import WAYS
-    from policies.blind_ways import BlindWayPolicy
-    from policies.oracle import OraclePolicy
+    from fixation_policies.blind_ways import BlindWayPolicy
+    from fixation_policies.oracle import OraclePolicy
 
     if not _sims:
         _sims.append(PickSim(CONTROL_FREQUENCY))

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from fixation_gym.robots import ROBOT
-from policies.blind_ways import BlindWay
+from fixation_policies.blind_ways import BlindWay
 
 ELEVATIONS = (42, 48, 55, 62, 70, 80, 85)
 """Of the straight ways above the table, deg; the arm's reach ends at 85."""

@@ -26,7 +26,7 @@ from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, Ob
 from fixation_gym.perception.zero_flow.region_vote import Side, VoteSettings, decide
 from fixation_gym.perception.zero_flow.zero_flow import UNKNOWN
 from fixation_gym.robots import ROBOT
-from policies.servo.gains import ServoGains
+from fixation_policies.servo.gains import ServoGains
 
 SETTLED_S = 0.6
 """From here on pixels are scored; before, every frame is looked at for the first call."""

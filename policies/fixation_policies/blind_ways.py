@@ -10,9 +10,9 @@ import numpy as np
 
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
-from policies.base import SimulatedWorld
-from policies.grips import grips_of, rolls
-from policies.oracle import GRASP_DISTANCE, OraclePolicy
+from fixation_policies.base import SimulatedWorld
+from fixation_policies.grips import grips_of, rolls
+from fixation_policies.oracle import GRASP_DISTANCE, OraclePolicy
 
 Origin = Literal["base", "view", "target"]
 Style = Literal["straight", "curved", "stepped"]

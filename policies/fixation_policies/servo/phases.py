@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from fixation_gym.control.open_loop import Stage
-from policies.servo.gains import ServoGains
+from fixation_policies.servo.gains import ServoGains
 
 
 class Phase(str, Enum):

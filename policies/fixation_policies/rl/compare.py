@@ -17,8 +17,8 @@ from fixation_gym.evaluation.files import write_csv, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, ResultStore
-from policies.catalogue import surroundings
-from policies.rl.comparison_tables import (
+from fixation_policies.catalogue import surroundings
+from fixation_policies.rl.comparison_tables import (
     CURVES_FILE,
     DIFFERENCES_FILE,
     FIGURE_FILE,
@@ -27,7 +27,7 @@ from policies.rl.comparison_tables import (
     differences_of,
     table_of,
 )
-from policies.rl.config import CONFIGS, TrainConfig
+from fixation_policies.rl.config import CONFIGS, TrainConfig
 
 RUNS_FOLDER = "runs"
 CELLS_FILE = "cells.jsonl"
@@ -101,7 +101,7 @@ def run_cell(cell: workers.Cell) -> dict[str, Any]:
     trained: dict[str, Any] = {"curve": [], "wall_s": 0.0, "seconds": {}}
     policy, image_size = SERVO, surroundings(SERVO).image_size
     if cell["config"] != SERVO:
-        from policies.rl.train import FINAL_FILE, train
+        from fixation_policies.rl.train import FINAL_FILE, train
 
         values = {**cell["training"], "image_size": tuple(cell["training"]["image_size"])}
         trained = train(TrainConfig(**values), folder, resume=(folder / RUN_FILE).exists())
@@ -154,7 +154,7 @@ def compare(
         write_csv(out / TABLE_FILE, summary["table"])
         write_csv(out / DIFFERENCES_FILE, summary["differences"])
         write_json(out / SUMMARY_FILE, summary)
-    from policies.rl.comparison_figure import draw_comparison
+    from fixation_policies.rl.comparison_figure import draw_comparison
 
     draw_comparison(summary, out / FIGURE_FILE)
     return summary

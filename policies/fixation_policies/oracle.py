@@ -17,8 +17,8 @@ from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.geometry.boxes import BoxSet, box_set, joined
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
-from policies.base import Action, Estimate, SimulatedWorld
-from policies.grips import LARGEST_SLANT, grips_of, half_turn, rolls, slants
+from fixation_policies.base import Action, Estimate, SimulatedWorld
+from fixation_policies.grips import LARGEST_SLANT, grips_of, half_turn, rolls, slants
 
 VIEW_DISTANCE, GRASP_DISTANCE = 0.42, 0.18
 """Distance of the camera from the target on the way around it, and at the end of the approach, m."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from policies.rl.decisions import PERIODS
-from policies.rl.hyperparameters import GAMMA, SAC_SETTINGS
+from fixation_policies.rl.decisions import PERIODS
+from fixation_policies.rl.hyperparameters import GAMMA, SAC_SETTINGS
 
 _COMMON: dict[str, Any] = {
     **SAC_SETTINGS,
@@ -22,7 +22,7 @@ _COMMON: dict[str, Any] = {
 hyperparams: dict[str, dict[str, Any]] = {
     "FixationPickZFC-v0": {
         **_COMMON,
-        "env_wrapper": "policies.rl.decisions.DecisionEnv",
+        "env_wrapper": "fixation_policies.rl.decisions.DecisionEnv",
         "env_kwargs": {"scenario": "mixed", "observation": "zfc", "image_size": (96, 128)},
         "n_timesteps": 8_000,
     },

@@ -13,7 +13,7 @@ from typing import Any
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.files import write_file
-from policies.rl.config import ALGORITHMS, CONFIGS
+from fixation_policies.rl.config import ALGORITHMS, CONFIGS
 
 FORMAT = 1
 _CARD, _WEIGHTS = "agent.json", "actor.pth"

@@ -32,7 +32,7 @@ from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.evidence_map import ZeroFlowSettings
 from fixation_gym.perception.zero_flow.front_rule import FrontRule, dot_product_rule, exact_rule
 from fixation_gym.types import Command, FloatArray, Observation
-from policies.base import Action, Estimate
+from fixation_policies.base import Action, Estimate
 
 _IN_FRONT = 0.5
 """Probability from which on a pixel is in front."""

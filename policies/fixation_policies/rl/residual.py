@@ -20,9 +20,9 @@ from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.percept import Percept
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import Command, FloatArray, Observation
-from policies.catalogue import make_policy
-from policies.servo.phases import Phase
-from policies.servo.servo_policy import ServoPolicy
+from fixation_policies.catalogue import make_policy
+from fixation_policies.servo.phases import Phase
+from fixation_policies.servo.servo_policy import ServoPolicy
 
 _SHARE = 0.5
 """Velocity added at action 1, in units of the camera's largest speed."""

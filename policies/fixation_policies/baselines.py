@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from policies.base import Action, Estimate
+from fixation_policies.base import Action, Estimate
 
 
 class RandomPolicy:

@@ -17,14 +17,14 @@ from fixation_gym.perception.detection.detector import Detector
 from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
-from policies.base import Policy
-from policies.baselines import RandomPolicy
-from policies.paper import PAPER_NAMES, paper_variant
-from policies.rl.agent_file import read_card
-from policies.rl.config import CONFIGS, require_learning_packages
-from policies.servo.servo_policy import ServoPolicy
-from policies.servo.variants import VARIANT_NAMES, ServoVariant, servo_variant
-from policies.strangers import is_class_name, load_class, source_hash
+from fixation_policies.base import Policy
+from fixation_policies.baselines import RandomPolicy
+from fixation_policies.paper import PAPER_NAMES, paper_variant
+from fixation_policies.rl.agent_file import read_card
+from fixation_policies.rl.config import CONFIGS, require_learning_packages
+from fixation_policies.servo.servo_policy import ServoPolicy
+from fixation_policies.servo.variants import VARIANT_NAMES, ServoVariant, servo_variant
+from fixation_policies.strangers import is_class_name, load_class, source_hash
 
 AGENT_SUFFIX = ".zip"
 POLICY_NAMES = (
@@ -129,13 +129,13 @@ def make_policy(name: str, env: Any, detector: str | None = None) -> Policy:
     check_policy(name)
     check_detector(detector, name)
     if name.endswith(AGENT_SUFFIX):
-        from policies.rl.agent import load_agent
+        from fixation_policies.rl.agent import load_agent
 
         return load_agent(Path(name), env)
     if name == "random":
         return RandomPolicy()
     if name == "oracle":
-        from policies.oracle import OraclePolicy
+        from fixation_policies.oracle import OraclePolicy
 
         return OraclePolicy(env.unwrapped)
     if name not in POLICY_NAMES:

@@ -19,14 +19,14 @@ from fixation_gym.envs.zfc_observation import OBSERVATIONS
 from fixation_gym.errors import UsageError
 from fixation_gym.perception.percept import Percept
 from fixation_gym.types import Observation
-from policies.base import Action, Estimate
-from policies.rl.agent_file import AgentCard, read_agent
-from policies.rl.config import CONFIGS
-from policies.rl.decisions import PERIODS, env_action
-from policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
-from policies.rl.inputs import STAGE, VIEWS, Memory, blind_stage, busy, input_space, network_inputs, remember
-from policies.rl.residual import ResidualServo
-from policies.servo.servo_policy import ServoPolicy
+from fixation_policies.base import Action, Estimate
+from fixation_policies.rl.agent_file import AgentCard, read_agent
+from fixation_policies.rl.config import CONFIGS
+from fixation_policies.rl.decisions import PERIODS, env_action
+from fixation_policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
+from fixation_policies.rl.inputs import STAGE, VIEWS, Memory, blind_stage, busy, input_space, network_inputs, remember
+from fixation_policies.rl.residual import ResidualServo
+from fixation_policies.servo.servo_policy import ServoPolicy
 
 _STAGES = tuple(stage.value for stage in Stage)
 
@@ -122,7 +122,7 @@ def load_agent(path: Path, env: Any) -> Agent | ResidualAgent:
     decider = Decider(_network(path, card, observation, 2 if residual else 4, weights), 2 if residual else 4)
     if not residual:
         return Agent(card, decider)
-    from policies.catalogue import make_policy
+    from fixation_policies.catalogue import make_policy
 
     servo = make_policy("servo", env)
     assert isinstance(servo, ServoPolicy)

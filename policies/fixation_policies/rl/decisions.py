@@ -9,7 +9,15 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from policies.rl.inputs import Memory, blind_stage, busy, input_space, network_inputs, observation_name, remember
+from fixation_policies.rl.inputs import (
+    Memory,
+    blind_stage,
+    busy,
+    input_space,
+    network_inputs,
+    observation_name,
+    remember,
+)
 
 PERIODS = 5
 """Control periods for which an action is held: 5 decisions per second."""

@@ -17,7 +17,7 @@ from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.evidence_map import ZeroFlowSettings
 from fixation_gym.perception.zero_flow.front_rule import dot_product_rule
 from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings
-from policies.servo.gains import ServoGains
+from fixation_policies.servo.gains import ServoGains
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.evaluation.statistics import wilson_interval
-from policies.rl.aggregates import bootstrap_interval, interquartile_mean
+from fixation_policies.rl.aggregates import bootstrap_interval, interquartile_mean
 
 CURVES_FILE, TABLE_FILE, DIFFERENCES_FILE, FIGURE_FILE = "curves.csv", "table.csv", "differences.csv", "comparison.png"
 MEASURES = {"success": "successes", "collision_free": "collision_free_successes"}

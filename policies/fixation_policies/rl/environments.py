@@ -14,8 +14,8 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from fixation_gym.errors import UsageError
-from policies.rl.config import TRAIN_SEEDS, VALIDATION_SEEDS, TrainConfig
-from policies.rl.decisions import DecisionEnv, FixedEpisodes
+from fixation_policies.rl.config import TRAIN_SEEDS, VALIDATION_SEEDS, TrainConfig
+from fixation_policies.rl.decisions import DecisionEnv, FixedEpisodes
 
 _DEATHS = (EOFError, BrokenPipeError, ConnectionResetError)
 """What a pipe says when the process at its other end is gone."""
@@ -36,7 +36,7 @@ def make_learner_env(config: TrainConfig, rank: int) -> gym.Env[Any, Any]:
         "sensor_noise": config.sensor_noise,
     }
     if config.residual:
-        from policies.rl.residual import ResidualEnv
+        from fixation_policies.rl.residual import ResidualEnv
 
         env: gym.Env[Any, Any] = ResidualEnv(gym.make("FixationPick-v0", **arguments))
     else:

@@ -6,7 +6,7 @@ what the arm can do; then where the hand goes.
 
 from __future__ import annotations
 
-from policies.paper import PAPER_VARIANTS
+from fixation_policies.paper import PAPER_VARIANTS
 
 LADDER: dict[str, str] = {
     **{variant.name: variant.summary for variant in PAPER_VARIANTS},

@@ -10,8 +10,8 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
-from policies.rl.checkpoints import Progress
-from policies.rl.overlap import BusyEnvs
+from fixation_policies.rl.checkpoints import Progress
+from fixation_policies.rl.overlap import BusyEnvs
 
 _RECENT = 100
 """Episodes over which the rates of training are taken."""

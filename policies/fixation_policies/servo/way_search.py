@@ -18,7 +18,7 @@ from fixation_gym.control.ways import (
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow.obstacle_memory import seen_places
 from fixation_gym.types import FloatArray
-from policies.servo.gains import ServoGains
+from fixation_policies.servo.gains import ServoGains
 
 _HIDING = 0.06
 """A thing hides what is behind it if it is nearer by this share."""

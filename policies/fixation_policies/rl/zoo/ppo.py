@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from policies.rl.decisions import PERIODS
-from policies.rl.hyperparameters import GAMMA, PPO_SETTINGS
+from fixation_policies.rl.decisions import PERIODS
+from fixation_policies.rl.hyperparameters import GAMMA, PPO_SETTINGS
 
 _COMMON: dict[str, Any] = {**PPO_SETTINGS, "policy": "MultiInputPolicy", "n_envs": 4}
 hyperparams: dict[str, dict[str, Any]] = {
     "FixationPickZFC-v0": {
         **_COMMON,
-        "env_wrapper": "policies.rl.decisions.DecisionEnv",
+        "env_wrapper": "fixation_policies.rl.decisions.DecisionEnv",
         "env_kwargs": {"scenario": "mixed", "observation": "zfc", "image_size": (96, 128)},
         "n_timesteps": 200_000,
     },

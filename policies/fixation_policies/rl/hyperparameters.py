@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from policies.rl.features import JoinedFeatures
+from fixation_policies.rl.features import JoinedFeatures
 
 GAMMA = 0.98
 """Per decision: what lies 10 s ahead counts a third."""
@@ -15,7 +15,7 @@ SAC_SETTINGS: dict[str, Any] = {
     "batch_size": 128,
     "tau": 0.01,
     "train_freq": 1,
-    "gradient_steps": 0,  # those of policies.rl.overlap take place while the environments step
+    "gradient_steps": 0,  # those of fixation_policies.rl.overlap take place while the environments step
     "ent_coef": "auto_0.1",
     "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256]},
 }

@@ -26,10 +26,10 @@ from fixation_gym.perception.zero_flow.obstacle_memory import (
 )
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import Command, FloatArray, Observation
-from policies.base import Action, Estimate
-from policies.servo.gains import ServoGains
-from policies.servo.phases import Phase, Situation, next_phase
-from policies.servo.way_search import Obstacles, WaySearch
+from fixation_policies.base import Action, Estimate
+from fixation_policies.servo.gains import ServoGains
+from fixation_policies.servo.phases import Phase, Situation, next_phase
+from fixation_policies.servo.way_search import Obstacles, WaySearch
 
 _OWN_RADIUS = 0.05
 """Points so near to the fixated point are the target's own, m."""

@@ -19,14 +19,14 @@ from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, check_same_run, folder_lock, make_folder
-from policies.rl.agent_file import AgentCard, write_agent
-from policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
-from policies.rl.config import TrainConfig
-from policies.rl.environments import closing, draw_new_scenes, start_workers, worker_deaths
-from policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
-from policies.rl.overlap import BusyEnvs, learn_meanwhile
-from policies.rl.validation import validate
-from policies.rl.watch import Watch
+from fixation_policies.rl.agent_file import AgentCard, write_agent
+from fixation_policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
+from fixation_policies.rl.config import TrainConfig
+from fixation_policies.rl.environments import closing, draw_new_scenes, start_workers, worker_deaths
+from fixation_policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
+from fixation_policies.rl.overlap import BusyEnvs, learn_meanwhile
+from fixation_policies.rl.validation import validate
+from fixation_policies.rl.watch import Watch
 
 BEST_FILE, FINAL_FILE = "best.zip", "final.zip"
 TENSORBOARD_FOLDER = "tensorboard"
