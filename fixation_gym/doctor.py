@@ -6,8 +6,10 @@ import platform
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module, metadata
+from pathlib import Path
 from typing import Any
 
+from fixation_gym import gl
 from fixation_gym.gl import PROBE_MODEL, MissingGLError, select_backend
 
 REQUIRED = (
@@ -26,10 +28,17 @@ REQUIRED = (
 )
 OPTIONAL = ("torch", "stable-baselines3", "tensorboard", "ray")
 HEADLESS_CV2 = "opencv-python-headless"
+_FORK = "may be forked or spawned at any time"
+_SPAWN = "must be spawned, or forked before the first picture"
 OTHER_CV2 = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
 """Distributions that write the same folder ``cv2``; with two of them, neither is whole."""
 
-_REINSTALL = "make a fresh environment: rm -rf .venv && make test"
+_FROM_SOURCE = (Path(__file__).parents[1] / "scripts" / "bootstrap.sh").exists()
+_REINSTALL = (
+    "make a fresh environment: rm -rf .venv && make test"
+    if _FROM_SOURCE
+    else "install the wheel again in a fresh environment: python -m venv fresh && fresh/bin/pip install <the wheel>"
+)
 
 
 def installed_versions() -> dict[str, str]:
@@ -55,43 +64,57 @@ def package_problems(versions: Mapping[str, str]) -> list[str]:
     missing = [name for name in REQUIRED if name not in versions]
     if missing:
         problems.append(f"not installed: {', '.join(missing)}; {_REINSTALL}")
-    extra_cv2 = [name for name in OTHER_CV2 if name in versions]
-    if extra_cv2:
-        every_cv2 = " ".join([*extra_cv2, HEADLESS_CV2])
-        problems.append(
-            f"{' and '.join(extra_cv2)} overwrites {HEADLESS_CV2}; pip uninstall -y {every_cv2} "
-            f"&& pip install {HEADLESS_CV2}"
-        )
+    others = [name for name in OTHER_CV2 if name in versions and versions[name] != versions.get(HEADLESS_CV2)]
+    if others:
+        problems.append(f"{' and '.join(others)} overwrites {HEADLESS_CV2} with another version; {_one_cv2(others)}")
     if "mujoco" in versions and not (3, 3) <= _release(versions["mujoco"])[:2] < (3, 10):
         problems.append(
             f"MuJoCo {versions['mujoco']} does not work with robosuite 1.5.2; pip install 'mujoco>=3.3,<3.10'"
         )
     if "robosuite" in versions and _release(versions["robosuite"])[:3] != (1, 5, 2):
         problems.append(f"robosuite {versions['robosuite']} is not 1.5.2; pip install robosuite==1.5.2")
-    if "numpy" in versions and _release(versions["numpy"])[:1] < (2,):
-        problems.append(
-            f"NumPy {versions['numpy']} is older than the tested 2.x (plain pip keeps an old limit of robosuite's); "
-            f"{_REINSTALL}"
-        )
     return problems
+
+
+def package_notes(versions: Mapping[str, str]) -> list[str]:
+    """What is unlike the versions that all tests run with, but works: plain pip obeys robosuite's old limits."""
+    notes = []
+    twins = [name for name in OTHER_CV2 if name in versions and versions[name] == versions.get(HEADLESS_CV2)]
+    if twins:
+        notes.append(
+            f"{' and '.join(twins)}, which robosuite asks for, holds the same files as {HEADLESS_CV2}: this works, but "
+            f"the windowed OpenCV needs libGL; without: {_one_cv2(twins)}"
+        )
+    if "numpy" in versions and _release(versions["numpy"])[:1] < (2,):
+        notes.append(
+            f"NumPy {versions['numpy']} works, but most tests run with 2.x; pip install 'numpy>=2' may be had against "
+            "robosuite's limit, which concerns a humanoid that is not used here"
+        )
+    return notes
+
+
+def _one_cv2(others: list[str]) -> str:
+    """How to have one OpenCV."""
+    return f"pip uninstall -y {' '.join([*others, HEADLESS_CV2])} && pip install {HEADLESS_CV2}"
 
 
 def diagnose() -> dict[str, Any]:
     """Look at versions and GL, and render one frame.
 
     Returns:
-        ``ok``; ``problems``, each with what to do; ``versions``; ``gl``, the backend or None; ``frame_brightness``, the
-        mean of a rendered test frame (0..255) or None.
+        ``ok``; ``problems``, each with what to do; ``notes`` on what works, but is not as tested; ``versions``; ``gl``,
+        the backend or None; ``gl_renderer``, its name of itself; ``workers``, which processes can render;
+        ``frame_brightness``, the mean of a rendered test frame (0..255) or None.
     """
     versions = installed_versions()
     problems = package_problems(versions)
-    gl = brightness = None
+    backend = brightness = None
     if "mujoco" in versions:
         try:
-            gl = select_backend()
+            backend = select_backend()
             brightness = frame_brightness()
             if brightness <= 0.0:
-                problems.append(f"the GL backend {gl} renders black frames; set MUJOCO_GL to egl or osmesa")
+                problems.append(f"the GL backend {backend} renders black frames; set MUJOCO_GL to egl or osmesa")
         except MissingGLError as error:
             problems.append(str(error))
         except Exception as error:  # a broken installation can fail in any way, and saying so is this command's job
@@ -99,8 +122,11 @@ def diagnose() -> dict[str, Any]:
     return {
         "ok": not problems,
         "problems": problems,
+        "notes": package_notes(versions),
         "versions": versions,
-        "gl": gl,
+        "gl": backend,
+        "gl_renderer": gl.renderer_name(),
+        "workers": _FORK if gl.renders_after_fork() else _SPAWN,
         "frame_brightness": brightness,
     }
 
@@ -112,6 +138,7 @@ def frame_brightness() -> float:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     with mujoco.Renderer(model, 64, 64) as renderer:
+        gl.note_context()
         renderer.update_scene(data, "down")
         return float(renderer.render().mean())
 

@@ -100,15 +100,18 @@ def renderer_name() -> str:
     return _renderer_name
 
 
+def renders_after_fork() -> bool:
+    """Whether a process forked from this one after the first picture can render: software without threads can."""
+    return any(name in _renderer_name for name in _SOFTWARE) and os.environ.get("LP_NUM_THREADS") == "0"
+
+
 def require_own_context() -> None:
     """Check that this process may open a GL context.
 
     Raises:
         RuntimeError: if it was forked from one that has rendered, and GL would not work in it.
     """
-    forked = _first_process not in (None, os.getpid())
-    in_software = any(name in _renderer_name for name in _SOFTWARE)
-    if forked and not (in_software and os.environ.get("LP_NUM_THREADS") == "0"):
+    if _first_process not in (None, os.getpid()) and not renders_after_fork():
         raise RuntimeError(
             f"a process forked from one that has rendered cannot render with {_renderer_name}: start workers by spawn, "
             'as with gym.make_vec(..., vector_kwargs={"context": "spawn"}), or fork before the first reset'

@@ -27,7 +27,6 @@ def test_a_healthy_installation_has_no_problems() -> None:
         ({"mujoco": "3.10.0"}, "pip install 'mujoco>=3.3,<3.10'"),
         ({"mujoco": "3.2.7"}, "pip install 'mujoco>=3.3,<3.10'"),
         ({"mujoco": "4.0.0"}, "pip install 'mujoco>=3.3,<3.10'"),
-        ({"numpy": "1.26.4"}, "NumPy 1.26.4 is older"),
         ({"robosuite": "1.4.1"}, "pip install robosuite==1.5.2"),
         ({"python": "3.13.0"}, "use 3.10, 3.11 or 3.12"),
     ],
@@ -36,6 +35,20 @@ def test_each_bad_version_is_one_problem_with_a_remedy(change: dict[str, str], p
     problems = doctor.package_problems({**HEALTHY, **change})
     assert len(problems) == 1
     assert problem in problems[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "note"),
+    [
+        ({"numpy": "1.26.4"}, "NumPy 1.26.4 works"),
+        ({"opencv-python": "1.0"}, "holds the same files as opencv-python-headless"),
+    ],
+)
+def test_what_plain_pip_gives_is_a_note_and_no_problem(change: dict[str, str], note: str) -> None:
+    versions = {**HEALTHY, **change}
+    assert doctor.package_problems(versions) == []
+    assert [note in said for said in doctor.package_notes(versions)] == [True]
+    assert doctor.package_notes(HEALTHY) == []
 
 
 def test_a_missing_package_is_named() -> None:
@@ -81,3 +94,5 @@ def test_this_installation_is_healthy() -> None:
     assert diagnosis["problems"] == []
     assert diagnosis["ok"]
     assert diagnosis["frame_brightness"] > 0.0
+    assert diagnosis["gl_renderer"]
+    assert diagnosis["workers"].startswith("may be forked" if "llvmpipe" in diagnosis["gl_renderer"] else "m")
