@@ -57,6 +57,15 @@ class Mover:
         self._spares_taken = spares_taken
         self._acting = False
 
+    @property
+    def state(self) -> tuple[bool, float]:
+        """Whether it acts, and until when, s."""
+        return self._acting, self._until
+
+    @state.setter
+    def state(self, value: tuple[bool, float]) -> None:
+        self._acting, self._until = value
+
     def apply(self) -> None:
         """Set the wrench on the body for the next physics substep."""
         time = self._data.time

@@ -14,6 +14,7 @@ from fixation_gym.envs import config, rewards, sensors
 from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
+from fixation_gym.envs.state import EnvState, pack, unpack
 from fixation_gym.envs.target_box import target_box
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 
 RENDER_VIEWS = ("wrist", "front", "overlay")
 _FRONT_SIZE = (360, 480)
+_EPISODE = ("scene", "percept", "camera_on", "_np_random", "_noise_rng", "_errors", "_steps", "_steps_lifted")
+_EPISODE += ("_collided", "_target_box", "_state", "_arm", "_observation", "_last_rgb")
+"""What changes in an episode beside the simulation."""
 
 
 class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
@@ -109,6 +113,14 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         if self._image_size is None and render_view == "overlay":
             raise ValueError('render_view="overlay" shows what perception sees, so it needs an image_size')
         self.render_mode, self.render_view = render_mode, render_view
+        self._settings: dict[str, Any] = {
+            "scenario": self.scenario,
+            "image_size": self._image_size,
+            "sensor_noise": sensor_noise,
+            "control_frequency": control_frequency,
+            "reward": reward,
+            "reward_weights": reward_weights,
+        }
         self.metadata = self.metadata | {"render_fps": control_frequency}
         self.intrinsics = Intrinsics.from_fovy(*(self._image_size or config.IMAGE_SIZE), ROBOT.camera.fovy)
         self.hand_eye = ROBOT.camera.hand_eye
@@ -124,6 +136,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self.percept: Percept | None = None
         """What whoever acts perceived in the last observation, if it says so: drawn into the overlay."""
         self.scene: SceneSpec | None = None
+        self._last_rgb: ImageArray = np.zeros((0, 0, 3), np.uint8)
         self.camera_on = True
         """While False, steps render nothing, and the last image and percept stay: for training, in grasps."""
 
@@ -204,6 +217,39 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             self._window = None
         self._sim = None
 
+    def get_state(self) -> EnvState:
+        """All that the rest of the episode depends on: simulation, controller, generators, movers, perception inside.
+
+        What wrappers keep, such as the steps that ``TimeLimit`` has counted, is not in it.
+
+        Raises:
+            gymnasium.error.ResetNeeded: before the first reset, and after ``close``.
+        """
+        self._require_reset()
+        return pack(self._settings, self._episode())
+
+    def set_state(self, state: EnvState) -> None:
+        """Go on from a state, bit by bit as the environment that it was taken from, also in another process.
+
+        Raises:
+            ValueError: if it is of another version, or of an environment with other arguments.
+        """
+        self._continue(unpack(state, self._settings))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles go on in mid-episode; simulation and views are built again."""
+        started = self._sim is not None and self.scene is not None
+        arguments = {**self._settings, "render_mode": self.render_mode, "render_view": self.render_view}
+        return _made_again, (type(self), arguments, self.get_state() if started else None)
+
+    def _episode(self) -> dict[str, Any]:
+        return {"sim": self.sim.get_state(), **{name: getattr(self, name) for name in _EPISODE}}
+
+    def _continue(self, episode: dict[str, Any]) -> None:
+        self.sim.set_state(episode["sim"])
+        for name in _EPISODE:
+            setattr(self, name, episode[name])
+
     def _require_reset(self) -> None:
         if self._sim is None or self.scene is None:
             raise gym.error.ResetNeeded("call reset() first: after gym.make, and again after close()")
@@ -234,8 +280,8 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
 
     @property
     def wrist_view(self) -> View:
-        """The view that makes the observation's image, opened at the first reset."""
-        return self._views["observation"]
+        """The view that makes the observation's image."""
+        return self._view("observation")
 
     @property
     def sensed(self) -> dict[str, Any]:
@@ -272,7 +318,12 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         return observation
 
     def _image(self, view: str, qpos: FloatArray) -> ImageArray:
-        """Render one of the views "observation", "wrist" and "front", opening it at first use."""
+        """Render one of the views "observation", "wrist" and "front"."""
+        mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
+        return self._view(view).render(qpos, with_reflections=mirror)
+
+    def _view(self, view: str) -> View:
+        """One of the views, opened at first use."""
         if view not in self._views:
             from fixation_gym.envs.rendering import View
 
@@ -281,8 +332,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             for_people = view != "observation"
             model = self.sim.display_model if for_people else self.sim.model
             self._views[view] = View(model, camera, *size, full_quality=for_people)
-        mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
-        return self._views[view].render(qpos, with_reflections=mirror)
+        return self._views[view]
 
     def _task_state(self) -> rewards.TaskState:
         distance = math.dist(self.sim.body_position("target"), self.sim.tool_position())
@@ -294,12 +344,20 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         x, y, z = (pose[:3, :3].T @ (self.sim.body_position("target") - pose[:3, 3])).tolist()
         camera = self.intrinsics
         offset = math.hypot(camera.fx * x / z, camera.fy * y / z) if z > 0.0 else math.nan
+        # NumPy's scalars: some libraries ask every value for its dtype.
         return {
-            "is_success": self._state.success,
-            "success": self._state.success,
-            "collision": self._state.collision,
-            "clearance_m": self.sim.clearance(),
-            "distance_true_m": z,
-            "fixation_error_px": offset,
+            "is_success": np.bool_(self._state.success),
+            "success": np.bool_(self._state.success),
+            "collision": np.bool_(self._state.collision),
+            "clearance_m": np.float64(self.sim.clearance()),
+            "distance_true_m": np.float64(z),
+            "fixation_error_px": np.float64(offset),
             "reward_terms": terms,
         }
+
+
+def _made_again(make: type[FixationPickEnv], arguments: dict[str, Any], state: EnvState | None) -> FixationPickEnv:
+    env = make(**arguments)
+    if state is not None:
+        env.set_state(state)
+    return env

@@ -8,6 +8,7 @@ optical camera frame.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +29,7 @@ from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 _JOINTS = ROBOT.arm.joints
+_COUNTS = ("nbody_awake", "ntree_awake", "nv_awake", "nparent_awake")
 _OPEN = 0.5 * ROBOT.hand.opening
 """Way of one finger, m."""
 
@@ -43,6 +45,19 @@ class ArmState:
     jacobian: FloatArray
     """Camera twist expressed in ``cam`` per joint velocity, shape (6, n)."""
     gripper_width: float
+
+
+@dataclass(frozen=True, eq=False)
+class SimState:
+    """What the simulation's future depends on."""
+
+    scene: SceneSpec
+    data: Any
+    """A copy of the ``mjData``. Places and speeds would not do: bodies that sleep, and how long others rest, count."""
+    awake: tuple[int, ...]
+    """Its ``_COUNTS``, which a pickle of it forgets."""
+    joint_command: FloatArray
+    movers: tuple[tuple[bool, float], ...]
 
 
 class PickSim:
@@ -191,6 +206,22 @@ class PickSim:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         return exposed, collided
+
+    def get_state(self) -> SimState:
+        """What its future depends on; call it after a reset."""
+        counts = tuple(getattr(self.data, name) for name in _COUNTS)
+        movers = tuple(mover.state for mover in self._movers)
+        return SimState(self._scene, copy.copy(self.data), counts, self._joint_command.copy(), movers)
+
+    def set_state(self, state: SimState) -> None:
+        """Go on from there, bit by bit as the simulation that it was taken from."""
+        self.reset(state.scene)
+        for name, count in zip(_COUNTS, state.awake, strict=True):
+            setattr(state.data, name, count)
+        mujoco.mj_copyData(self.data, self.model, state.data)
+        self._joint_command[:] = state.joint_command
+        for mover, value in zip(self._movers, state.movers, strict=True):
+            mover.state = value
 
     @property
     def display_model(self) -> Any:

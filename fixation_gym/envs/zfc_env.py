@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -25,6 +25,9 @@ from fixation_gym.perception.detection.box_tracker import BoxTracker
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
+
+if TYPE_CHECKING:
+    from fixation_gym.envs.privileged_map import ObstacleDepth
 
 _GAINS = FixatorGains(open_loop=OpenLoopGains(hold_seconds=3.0))
 
@@ -118,6 +121,8 @@ class FixationPickZFC(FixationPickEnv):
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = zfc_observation_space(observation, (self.intrinsics.height, self.intrinsics.width))
         self._shown = observation
+        self._settings["observation"] = observation
+        self._truth: ObstacleDepth | None = None
         detector = BoxTracker(self.intrinsics) if self.scenario.any_colour else None
         table = ROBOT.workspace.table_height
         self._fixator = Fixator(Perception(self.intrinsics, support_height_m=table, detector=detector), _GAINS)
@@ -126,11 +131,8 @@ class FixationPickZFC(FixationPickEnv):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Draw a new scene. ``options`` are not used."""
+        self._truth = None
         sensed, info = super().reset(seed=seed, options=options)
-        if self._shown == "privileged":
-            from fixation_gym.envs.privileged_map import ObstacleDepth
-
-            self._truth = ObstacleDepth(self.wrist_view, self.model)
         self._fixator.reset()
         return self._perceived(sensed, info), info
 
@@ -147,6 +149,20 @@ class FixationPickZFC(FixationPickEnv):
         sensed, reward, terminated, truncated, info = super().step(action_of(command))
         return self._perceived(sensed, info), reward, terminated, truncated, info
 
+    def _episode(self) -> dict[str, Any]:
+        return {**super()._episode(), "fixator": self._fixator}
+
+    def _continue(self, episode: dict[str, Any]) -> None:
+        super()._continue(episode)
+        self._fixator = episode["fixator"]
+
+    def _true_map(self, distance: float) -> np.ndarray:
+        if self._truth is None:
+            from fixation_gym.envs.privileged_map import ObstacleDepth
+
+            self._truth = ObstacleDepth(self.wrist_view, self.model)
+        return map_levels(self._truth.nearer(self.data, distance))
+
     def _perceived(self, sensed: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
         """What the learner sees, for the observation and info of ``FixationPick-v0``."""
         reading, fixator = Observation.from_dict(sensed), self._fixator
@@ -157,7 +173,7 @@ class FixationPickZFC(FixationPickEnv):
         elif self._shown == "rgb":
             observation["rgb"] = reading.rgb
         elif self._shown == "privileged":
-            observation["true_map"] = map_levels(self._truth.nearer(self.data, info["distance_true_m"]))
+            observation["true_map"] = self._true_map(info["distance_true_m"])
         observation["fixation"] = fixation_vector(percept.fixation)
         observation["proprio"] = proprio_vector(reading, fixator.T_base_cam, fixator.stage)
         return observation

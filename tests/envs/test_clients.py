@@ -165,6 +165,14 @@ def test_scenes_do_not_depend_on_how_long_the_episodes_before_were():
     env.close()
 
 
+def test_values_in_info_have_a_dtype_as_torchrl_asks():
+    env = FixationPickEnv(image_size=SMALL)
+    _, info = env.reset(seed=0)
+    dtypes = {key: value.dtype for key, value in info.items() if key != "reward_terms"}
+    assert {key for key, dtype in dtypes.items() if dtype.kind == "b"} == {"is_success", "success", "collision"}
+    env.close()
+
+
 def test_the_renderer_has_a_name():
     env = FixationPickEnv(image_size=SMALL)
     env.reset(seed=0)
