@@ -67,10 +67,8 @@ def package_problems(versions: Mapping[str, str]) -> list[str]:
     others = [name for name in OTHER_CV2 if name in versions and versions[name] != versions.get(HEADLESS_CV2)]
     if others:
         problems.append(f"{' and '.join(others)} overwrites {HEADLESS_CV2} with another version; {_one_cv2(others)}")
-    if "mujoco" in versions and not (3, 3) <= _release(versions["mujoco"])[:2] < (3, 10):
-        problems.append(
-            f"MuJoCo {versions['mujoco']} does not work with robosuite 1.5.2; pip install 'mujoco>=3.3,<3.10'"
-        )
+    if "mujoco" in versions and not (3, 7) <= _release(versions["mujoco"])[:2] < (5, 0):
+        problems.append(f"MuJoCo {versions['mujoco']} is not among those that were tried; pip install 'mujoco>=3.7,<5'")
     if "robosuite" in versions and _release(versions["robosuite"])[:3] != (1, 5, 2):
         problems.append(f"robosuite {versions['robosuite']} is not 1.5.2; pip install robosuite==1.5.2")
     return problems

@@ -24,9 +24,8 @@ def test_a_healthy_installation_has_no_problems() -> None:
     ("change", "problem"),
     [
         ({"opencv-python": "4.11"}, "pip uninstall -y opencv-python opencv-python-headless && pip install"),
-        ({"mujoco": "3.10.0"}, "pip install 'mujoco>=3.3,<3.10'"),
-        ({"mujoco": "3.2.7"}, "pip install 'mujoco>=3.3,<3.10'"),
-        ({"mujoco": "4.0.0"}, "pip install 'mujoco>=3.3,<3.10'"),
+        ({"mujoco": "3.6.0"}, "pip install 'mujoco>=3.7,<5'"),
+        ({"mujoco": "5.0.0"}, "pip install 'mujoco>=3.7,<5'"),
         ({"robosuite": "1.4.1"}, "pip install robosuite==1.5.2"),
         ({"python": "3.13.0"}, "use 3.10, 3.11 or 3.12"),
     ],

@@ -35,7 +35,7 @@ class ArmDynamics(NamedTuple):
     hand_rotation: FloatArray
     """Columns are the hand's axes, shape (3, 3)."""
     mass: FloatArray
-    """Joint-space inertia of the chain, packed by rows: M[i, i], M[i, i-1] ... M[i, 0], shape (n (n + 1) / 2,)."""
+    """Joint-space inertia of the chain, packed by rows: M[i, 0] ... M[i, i-1], M[i, i], shape (n (n + 1) / 2,)."""
     bias: FloatArray
     """Gravity and Coriolis torques, shape (n,), N m."""
     passive: FloatArray
@@ -102,7 +102,7 @@ def arm_torques(arm: ArmDynamics, task: ArmTask, twist: FloatArray, command: Flo
     row = 0
     for i in range(joints):
         for back in range(i + 1):
-            inertia = arm.mass[row + back]
+            inertia = arm.mass[row + i - back]
             torques[i] += inertia * acceleration[i - back]
             if back > 0:
                 torques[i - back] += inertia * acceleration[i]

@@ -78,7 +78,7 @@ class PickSim:
         """
         self._posture = np.array(posture)
         self._control_frequency, self._extend = control_frequency, extend
-        self._compiled = compile_model(control_frequency, extend)
+        self._compiled = compile_model(extend)
         self.model: Any = self._compiled.model
         self.data: Any = self._compiled.data
         model = self.model
@@ -113,7 +113,7 @@ class PickSim:
             axes=data.xaxis[arm],
             hand_position=data.xpos[self._hand],
             hand_rotation=data.xmat[self._hand].reshape(3, 3),
-            mass=data.qM[: _JOINTS * (_JOINTS + 1) // 2],
+            mass=data.M[: _JOINTS * (_JOINTS + 1) // 2],
             bias=data.qfrc_bias[arm],
             passive=data.qfrc_passive[arm],
         )
@@ -227,7 +227,7 @@ class PickSim:
     def display_model(self) -> Any:
         """The model with the robot's looks, for pictures for people, with the same scene; compiled at first use."""
         if self._display is None:
-            model = compile_model(self._control_frequency, self._extend, looks=True).model
+            model = compile_model(self._extend, looks=True).model
             self._display = model, SceneLoader(model)
             self._display[1].load(self._scene)
         return self._display[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
@@ -14,8 +13,10 @@ from fixation_gym.robots import ROBOT
 # On import robosuite warns of optional parts (other robots, whole-body IK) that are not used here.
 _disabled_before = logging.root.manager.disable
 logging.disable(logging.WARNING)
-from robosuite.environments.manipulation.manipulation_env import ManipulationEnv  # noqa: E402
 from robosuite.models.arenas import TableArena  # noqa: E402
+from robosuite.models.bases import robot_base_factory  # noqa: E402
+from robosuite.models.grippers import gripper_factory  # noqa: E402
+from robosuite.models.robots.robot_model import create_robot  # noqa: E402
 from robosuite.models.tasks import ManipulationTask  # noqa: E402
 from robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER  # noqa: E402
 from robosuite.utils.mjcf_utils import xml_path_completion  # noqa: E402
@@ -40,66 +41,44 @@ class _Scene(ManipulationTask):
         """Nothing here uses robosuite's segmentation, which asks for geoms that ``remove_looks`` takes out."""
 
 
-class _FixationPickTask(ManipulationEnv):
-    """robosuite task: the robot at a table with the object pool. Only builds the model; ``PickSim`` steps it."""
+def build_xml(extend: SceneExtension | None, looks: bool) -> str:
+    """The robot at a table with the object pool, as MJCF.
 
-    def __init__(self, extend: SceneExtension | None, looks: bool, **options: Any) -> None:
-        self._extend, self._looks = extend, looks  # the base class loads the model
-        super().__init__(**options)
-
-    def _load_model(self) -> None:
-        super()._load_model()
-        robot = self.robots[0].robot_model
-        robot.set_base_xpos(robot.base_xpos_offset["table"](_TABLE_SIZE[0]))
-        arena = TableArena(table_full_size=_TABLE_SIZE, table_offset=_TABLE_OFFSET)
-        arena.set_origin([0, 0, 0])
-        self.model = _Scene(mujoco_arena=arena, mujoco_robots=[robot])
-        scene_mjcf.add_materials(self.model.asset, lambda file: xml_path_completion(f"textures/{file}"))
-        worldbody = self.model.worldbody
-        hand = next(body for body in worldbody.iter("body") if body.get("name") == HAND_BODY)
-        scene_mjcf.add_wrist_camera(hand)
-        scene_mjcf.add_object_pool(worldbody)
-        scene_mjcf.add_background(worldbody, _TABLE_OFFSET)
-        if self._extend is not None:
-            self._extend(self.model.asset, worldbody)
-        scene_mjcf.draw_last(worldbody)
-        if not self._looks:
-            scene_mjcf.remove_looks(self.model.asset, worldbody, ROBOT_BODIES)
-        ET.SubElement(self.model.contact, "exclude", {"body1": BASE_BODY, "body2": _FIRST_LINK})
-
-    def reward(self, action: Any = None) -> float:
-        """Rewards are the business of the Gymnasium environment."""
-        return 0.0
-
-
-def build_model(control_frequency: int, extend: SceneExtension | None, looks: bool) -> tuple[Any, Any]:
-    """Build and compile the task.
+    Of robosuite only the models are used. Its environments, controllers and bindings would build a second model of the
+    robot, take ten times as long, and do not run with MuJoCo 4.
 
     Args:
-        control_frequency: steps per second.
         extend: adds an experiment's own things to the model.
         looks: with the meshes that only people look at; joints and contacts are the same without.
-
-    Returns:
-        ``mjModel`` and ``mjData``.
     """
-    task: Any = _FixationPickTask(
-        extend,
-        looks,
-        robots=ROBOT.simulated.robot,
-        gripper_types=ROBOT.simulated.gripper,
-        has_offscreen_renderer=False,
-        use_camera_obs=False,
-        hard_reset=False,
-        control_freq=control_frequency,
-        initialization_noise=None,
-    )
-    model, data = task.sim.model._model, task.sim.data._data
-    # robosuite's objects refer to each other in circles: until Python looks for those, they would hold this model and a
-    # second one of the robot, together some 100 MB for every environment made.
-    del task
-    gc.collect()
-    return model, data
+    arena = TableArena(table_full_size=_TABLE_SIZE, table_offset=_TABLE_OFFSET)
+    arena.set_origin([0, 0, 0])
+    model = _Scene(mujoco_arena=arena, mujoco_robots=[_robot()])
+    scene_mjcf.add_materials(model.asset, lambda file: xml_path_completion(f"textures/{file}"))
+    worldbody = model.worldbody
+    hand = next(body for body in worldbody.iter("body") if body.get("name") == HAND_BODY)
+    scene_mjcf.add_wrist_camera(hand)
+    scene_mjcf.add_object_pool(worldbody)
+    scene_mjcf.add_background(worldbody, _TABLE_OFFSET)
+    if extend is not None:
+        extend(model.asset, worldbody)
+    scene_mjcf.draw_last(worldbody)
+    if not looks:
+        scene_mjcf.remove_looks(model.asset, worldbody, ROBOT_BODIES)
+    ET.SubElement(model.contact, "exclude", {"body1": BASE_BODY, "body2": _FIRST_LINK})
+    return model.get_xml()
+
+
+def _robot() -> Any:
+    """The arm on its base at the table, with its gripper."""
+    robot = create_robot(ROBOT.simulated.robot, idn=0)
+    robot.add_base(base=robot_base_factory(robot.default_base, idn=0))
+    robot.update_joints()
+    robot.update_actuators()
+    gripper = gripper_factory(ROBOT.simulated.gripper, idn="0_right")  # pyright: ignore[reportArgumentType]
+    robot.add_gripper(gripper, arm_name=robot.eef_name["right"])
+    robot.set_base_xpos(robot.base_xpos_offset["table"](_TABLE_SIZE[0]))
+    return robot
 
 
 def make_lift(control_frequency: int, image_size: int | None, hard_reset: bool = True) -> Any:

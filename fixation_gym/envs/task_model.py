@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from fixation_gym.envs import contacts, scene_mjcf
-from fixation_gym.envs.robosuite_backend import ROBOT_BODIES, SceneExtension, build_model
+from fixation_gym.envs.robosuite_backend import ROBOT_BODIES, SceneExtension, build_xml
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,16 +26,15 @@ class TaskModel:
     """Owner of every geom, as in ``contacts``."""
 
 
-def compile_model(control_frequency: int, extend: SceneExtension | None = None, *, looks: bool = False) -> TaskModel:
+def compile_model(extend: SceneExtension | None = None, *, looks: bool = False) -> TaskModel:
     """Build and compile the model.
 
     Args:
-        control_frequency: control steps per second.
         extend: adds an experiment's own things to the model.
         looks: with the robot's looks, for pictures for people. Without them the robot is seen by its coarse stand-ins,
             the collision shapes, and only in a mirror; ``qpos`` means the same in both.
     """
-    model, data = build_model(control_frequency, extend, looks)
+    model = mujoco.MjModel.from_xml_string(build_xml(extend, looks))
     mirror = model.mat("mirror_glass").id
     model.mat_reflectance[np.arange(model.nmat) != mirror] = 0.0
     # Pool shapes are resized at reset, the mid-phase's bounding trees are not. Nobody reads robosuite's sensors.
@@ -53,4 +52,4 @@ def compile_model(control_frequency: int, extend: SceneExtension | None = None, 
             model.geom_rgba[geom] = (0.85, 0.86, 0.88, 1.0)
     for leg in range(1, 5):  # under the table, from where neither wrist camera nor mirror can see them
         model.geom(f"table_leg{leg}_visual").group = scene_mjcf.ROBOT_GROUP
-    return TaskModel(model, data, owners)
+    return TaskModel(model, mujoco.MjData(model), owners)

@@ -48,9 +48,10 @@ def test_torques_are_those_of_the_dense_mass_matrix(sim):
     velocity = joint_velocities(jacobian, twist, data.qpos[:7].copy(), sim._posture, sim._limits)
     lead = command + velocity * model.opt.timestep - data.qpos[:7]
     acceleration = computed_torque._VELOCITY_GAIN * (velocity - data.qvel[:7]) + computed_torque._POSITION_GAIN * lead
-    mass = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, mass, data.qM)
-    expected = mass[:7, :7] @ acceleration + data.qfrc_bias[:7] - data.qfrc_passive[:7]
+    forces, padded = np.zeros(model.nv), np.zeros(model.nv)
+    padded[:7] = acceleration
+    mujoco.mj_mulM(model, data, forces, padded)
+    expected = forces[:7] + data.qfrc_bias[:7] - data.qfrc_passive[:7]
     arm_torques(arm, sim._task, twist, command, torques)
     np.testing.assert_allclose(torques, expected, atol=1e-9)
 
