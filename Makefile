@@ -4,7 +4,7 @@
 VENV := .venv/bin
 ARGS :=
 
-.PHONY: demo test test-core lint evaluate golden bench doctor core full lock clean
+.PHONY: demo test test-core test-newest lint evaluate golden bench doctor core full lock clean
 
 demo: core
 	$(VENV)/fixation-gym demo $(ARGS)
@@ -14,6 +14,12 @@ test: full  # on up to four cores
 
 test-core: full  # the tier without simulator
 	$(VENV)/pytest -m "not sim" $(ARGS)
+
+# The environments once more on the newest MuJoCo that was tried; it is put beside .venv and comes first on the path.
+NEWEST_MUJOCO := 4.0.0
+test-newest: full
+	$(VENV)/uv pip install --quiet --target .venv/newest --no-deps mujoco==$(NEWEST_MUJOCO) 'mujoco-core~=$(NEWEST_MUJOCO)'
+	PYTHONPATH=.venv/newest $(VENV)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile tests/envs $(ARGS)
 
 lint: full
 	$(VENV)/ruff check .
