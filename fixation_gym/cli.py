@@ -22,6 +22,7 @@ from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.experiments.distance.config import DistanceConfig
 from fixation_gym.experiments.scenarios.config import ScenariosConfig
+from fixation_gym.export.config import ExportConfig
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train
 from fixation_gym.names import Names
@@ -92,6 +93,24 @@ class Evaluate(EvaluationConfig):
             print_different(film_failures(self.out, self.workers, self.backend))
         print(format_table(summary["scenarios"]))
         print(f"\n{self.out / SUMMARY_FILE}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Export(ExportConfig):
+    """Record a policy's episodes as a data set for other libraries. The same command again resumes, or adds more."""
+
+    out: Path = Path("out/export")
+    """Folder of the data set."""
+
+    def run(self) -> int:
+        """Record and say what there is."""
+        self.check()
+        select_backend()
+        from fixation_gym.export.run import export
+
+        summary = export(self, self.out)
+        print(f"{summary['episodes']} episodes, {summary['frames']} frames, {summary['successes']} picks\n\n{self.out}")
         return 0
 
 
@@ -187,6 +206,7 @@ Commands = (
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Ablate, tyro.conf.subcommand("ablate")]
     | Annotated[Ladder, tyro.conf.subcommand("ladder")]
+    | Annotated[Export, tyro.conf.subcommand("export")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Compare, tyro.conf.subcommand("compare")]

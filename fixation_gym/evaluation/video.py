@@ -23,11 +23,11 @@ class VideoWriter:
     The file gets its name only once it is complete; an exception leaves none.
     """
 
-    def __init__(self, path: Path, fps: float) -> None:
-        """Prepare a video; the first frame decides its size."""
+    def __init__(self, path: Path, fps: float, crf: int = 23) -> None:
+        """Prepare a video; the first frame decides its size. ``crf`` 0 is without loss, more is smaller."""
         self._path = path
         self._temporary = path.with_name(f".{path.stem}.part{path.suffix}")
-        self._fps = fps
+        self._fps, self._crf = fps, crf
         self._shape: tuple[int, ...] | None = None
         self._encoder = None
 
@@ -48,7 +48,7 @@ class VideoWriter:
                 pix_fmt_in="rgb24",
                 pix_fmt_out="yuv420p",
                 macro_block_size=2,
-                output_params=["-movflags", "+faststart"],
+                output_params=["-movflags", "+faststart", "-crf", str(self._crf)],
                 ffmpeg_log_level="error",
             )
             self._encoder.send(None)
