@@ -28,11 +28,11 @@ REQUIRED = (
 )
 OPTIONAL = ("torch", "stable-baselines3", "tensorboard", "ray")
 HEADLESS_CV2 = "opencv-python-headless"
-_FORK = "may be forked or spawned at any time"
-_SPAWN = "must be spawned, or forked before the first picture"
 OTHER_CV2 = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
 """Distributions that write the same folder ``cv2``; with two of them, neither is whole."""
 
+_FORK = "may be forked or spawned at any time"
+_SPAWN = "must be spawned, or forked before the first picture"
 _FROM_SOURCE = (Path(__file__).parents[1] / "scripts" / "bootstrap.sh").exists()
 _REINSTALL = (
     "make a fresh environment: rm -rf .venv && make test"
@@ -64,7 +64,9 @@ def package_problems(versions: Mapping[str, str]) -> list[str]:
     missing = [name for name in REQUIRED if name not in versions]
     if missing:
         problems.append(f"not installed: {', '.join(missing)}; {_REINSTALL}")
-    others = [name for name in OTHER_CV2 if name in versions and versions[name] != versions.get(HEADLESS_CV2)]
+    others = [name for name in OTHER_CV2 if name in versions]
+    if _same_cv2("opencv-python", versions):
+        others.remove("opencv-python")
     if others:
         problems.append(f"{' and '.join(others)} overwrites {HEADLESS_CV2} with another version; {_one_cv2(others)}")
     if "mujoco" in versions and not (3, 7) <= _release(versions["mujoco"])[:2] < (5, 0):
@@ -77,18 +79,22 @@ def package_problems(versions: Mapping[str, str]) -> list[str]:
 def package_notes(versions: Mapping[str, str]) -> list[str]:
     """What is unlike the versions that all tests run with, but works: plain pip obeys robosuite's old limits."""
     notes = []
-    twins = [name for name in OTHER_CV2 if name in versions and versions[name] == versions.get(HEADLESS_CV2)]
-    if twins:
+    if _same_cv2("opencv-python", versions):
         notes.append(
-            f"{' and '.join(twins)}, which robosuite asks for, holds the same files as {HEADLESS_CV2}: this works, but "
-            f"the windowed OpenCV needs libGL; without: {_one_cv2(twins)}"
+            f"opencv-python, which robosuite asks for, writes into the folder of {HEADLESS_CV2}: this works, but needs "
+            f"libGL; without it: {_one_cv2(['opencv-python'])}"
         )
     if "numpy" in versions and _release(versions["numpy"])[:1] < (2,):
         notes.append(
-            f"NumPy {versions['numpy']} works, but most tests run with 2.x; pip install 'numpy>=2' may be had against "
-            "robosuite's limit, which concerns a humanoid that is not used here"
+            f"NumPy {versions['numpy']} works, but most tests run with 2.x. You may pip install 'numpy>=2': the limit "
+            "that robosuite brings concerns a humanoid that is not used here"
         )
     return notes
+
+
+def _same_cv2(name: str, versions: Mapping[str, str]) -> bool:
+    """Whether it is there in the same version as the headless one."""
+    return name in versions and versions[name] == versions.get(HEADLESS_CV2)
 
 
 def _one_cv2(others: list[str]) -> str:
@@ -123,8 +129,8 @@ def diagnose() -> dict[str, Any]:
         "notes": package_notes(versions),
         "versions": versions,
         "gl": backend,
-        "gl_renderer": gl.renderer_name(),
-        "workers": _FORK if gl.renders_after_fork() else _SPAWN,
+        "gl_renderer": gl.renderer_name() or None,
+        "workers": None if brightness is None else _FORK if gl.renders_after_fork() else _SPAWN,
         "frame_brightness": brightness,
     }
 

@@ -6,10 +6,12 @@ MuJoCo reads ``MUJOCO_GL`` when it is imported, and robosuite sets it to ``egl``
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 
 DEBIAN_PACKAGES = ("libegl1", "libgl1", "libgles2", "libosmesa6")
 CANDIDATES = ("egl", "osmesa")
@@ -42,6 +44,9 @@ _SOFTWARE = ("llvmpipe", "softpipe")
 """In the names of Mesa's software renderers."""
 _first_process: int | None = None
 _renderer_name = ""
+_has_threads = False
+"""Whether somebody rendered before the number of Mesa's threads was set."""
+_EGL_MODULES = ("mujoco.egl", "robosuite.renderers.context.egl_context")
 
 
 class MissingGLError(RuntimeError):
@@ -60,6 +65,7 @@ def select_backend() -> str:
     Raises:
         MissingGLError: if no backend renders, or the user's choice does not.
     """
+    _set_mesa_defaults()
     chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
     if chosen and chosen == os.environ.get(_CHECKED):
         return chosen
@@ -74,15 +80,22 @@ def select_backend() -> str:
             f"no GL library renders here; on Debian or Ubuntu: apt-get install {' '.join(DEBIAN_PACKAGES)}"
         )
     os.environ.update(backend_environment(backend), **{_CHECKED: backend})
-    # Mesa's software renderer: threads of its own do not live on in a forked process, which then waits for them for
-    # ever, and at the sizes of a wrist camera they save little.
-    os.environ.setdefault("LP_NUM_THREADS", "0")
-    # Cheaper blends between a texture's resolutions save a fifth of the time of a picture.
-    os.environ.setdefault("GALLIVM_PERF", "brilinear,rho_approx")
     if _CONTEXT_MODULE in sys.modules:
         # MuJoCo was imported first and may have taken its default, a window; now it reads MUJOCO_GL again.
         importlib.reload(sys.modules[_CONTEXT_MODULE])
     return backend
+
+
+def _set_mesa_defaults() -> None:
+    """Defaults for Mesa's software renderer, which reads them when the first context is made."""
+    global _has_threads
+    if "LP_NUM_THREADS" not in os.environ:
+        # Threads of its own do not survive a fork: the child then hangs. At the sizes of a wrist camera they save
+        # little.
+        os.environ["LP_NUM_THREADS"] = "0"
+        _has_threads = any(getattr(sys.modules.get(name), "EGL_DISPLAY", None) for name in _EGL_MODULES)
+    # Cheaper blends between a texture's resolutions save a fifth of the time of a picture.
+    os.environ.setdefault("GALLIVM_PERF", "brilinear,rho_approx")
 
 
 def note_context() -> None:
@@ -102,7 +115,8 @@ def renderer_name() -> str:
 
 def renders_after_fork() -> bool:
     """Whether a process forked from this one after the first picture can render: software without threads can."""
-    return any(name in _renderer_name for name in _SOFTWARE) and os.environ.get("LP_NUM_THREADS") == "0"
+    in_software = any(name in _renderer_name for name in _SOFTWARE)
+    return in_software and os.environ.get("LP_NUM_THREADS") == "0" and not _has_threads
 
 
 def require_own_context() -> None:
@@ -118,12 +132,28 @@ def require_own_context() -> None:
         )
 
 
-def release_context() -> None:
-    """Leave this thread without a GL context, so that another thread may render with it."""
-    if os.environ.get("MUJOCO_GL") == "egl":
-        from mujoco import egl
+@contextlib.contextmanager
+def borrowed_thread() -> Iterator[None]:
+    """Render meanwhile; afterwards this thread has the GL context that it had before.
 
-        egl.EGL.eglMakeCurrent(egl.EGL_DISPLAY, egl.EGL.EGL_NO_SURFACE, egl.EGL.EGL_NO_SURFACE, egl.EGL.EGL_NO_CONTEXT)
+    So another thread may take ours, and a library that takes its own to be current, such as robosuite, is right. With
+    EGL only: OSMesa does not give a context back.
+    """
+    if os.environ.get("MUJOCO_GL") != "egl":
+        yield
+        return
+    from OpenGL import EGL
+
+    display = EGL.eglGetCurrentDisplay()
+    before = EGL.eglGetCurrentContext()
+    surfaces = EGL.eglGetCurrentSurface(EGL.EGL_DRAW), EGL.eglGetCurrentSurface(EGL.EGL_READ)
+    try:
+        yield
+    finally:
+        if before:
+            EGL.eglMakeCurrent(display, *surfaces, before)
+        elif ours := EGL.eglGetCurrentDisplay():
+            EGL.eglMakeCurrent(ours, EGL.EGL_NO_SURFACE, EGL.EGL_NO_SURFACE, EGL.EGL_NO_CONTEXT)
 
 
 def renders(backend: str) -> bool:

@@ -40,7 +40,7 @@ def test_each_bad_version_is_one_problem_with_a_remedy(change: dict[str, str], p
     ("change", "note"),
     [
         ({"numpy": "1.26.4"}, "NumPy 1.26.4 works"),
-        ({"opencv-python": "1.0"}, "holds the same files as opencv-python-headless"),
+        ({"opencv-python": "1.0"}, "writes into the folder of opencv-python-headless"),
     ],
 )
 def test_what_plain_pip_gives_is_a_note_and_no_problem(change: dict[str, str], note: str) -> None:

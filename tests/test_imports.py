@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MUJOCO_FILES = {
     f"fixation_gym/envs/{name}.py"
-    for name in ("pick_sim", "task_model", "contacts", "rendering", "truth_view", "privileged_map")
+    for name in ("pick_sim", "task_model", "contacts", "offscreen", "rendering", "truth_view", "privileged_map")
 }
 FORBIDDEN = {
     "fixation_gym/robots": ("fixation_gym.envs", "gymnasium", "mujoco", "robosuite", "torch"),

@@ -14,7 +14,7 @@ from fixation_gym.envs import config, rewards, sensors
 from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
-from fixation_gym.envs.state import EnvState, pack, unpack
+from fixation_gym.envs.state import Resumable
 from fixation_gym.envs.target_box import target_box
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 RENDER_VIEWS = ("wrist", "front", "overlay")
 _FRONT_SIZE = (360, 480)
-_EPISODE = ("scene", "percept", "camera_on", "_np_random", "_noise_rng", "_errors", "_steps", "_steps_lifted")
-_EPISODE += ("_collided", "_target_box", "_state", "_arm", "_observation", "_last_rgb")
+_EPISODE = ("scene", "percept", "camera_on", "_np_random", "_np_random_seed", "_noise_rng", "_errors")
+_EPISODE += ("_steps", "_steps_lifted", "_collided", "_target_box", "_state", "_arm", "_observation", "_last_rgb")
 """What changes in an episode beside the simulation."""
 
 
-class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
+class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     """A Franka Panda (robosuite, MuJoCo) picks up the one red object on a table, seen by its wrist camera.
 
     **Action** ``Box(-1, 1, (7,), float32)``; values outside are clipped.
@@ -113,13 +113,12 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         if self._image_size is None and render_view == "overlay":
             raise ValueError('render_view="overlay" shows what perception sees, so it needs an image_size')
         self.render_mode, self.render_view = render_mode, render_view
-        self._settings: dict[str, Any] = {
-            "scenario": self.scenario,
+        self._arguments: dict[str, Any] = {
             "image_size": self._image_size,
             "sensor_noise": sensor_noise,
             "control_frequency": control_frequency,
             "reward": reward,
-            "reward_weights": reward_weights,
+            "reward_weights": rewards.resolve_weights(reward_weights or {}) if reward == "dense" else None,
         }
         self.metadata = self.metadata | {"render_fps": control_frequency}
         self.intrinsics = Intrinsics.from_fovy(*(self._image_size or config.IMAGE_SIZE), ROBOT.camera.fovy)
@@ -130,6 +129,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self.observation_space = observation_space(self._image_size)
         boxes = ((key, box) for key, box in self.observation_space.items() if isinstance(box, spaces.Box))
         self._limits = {key: (box.low, box.high) for key, box in boxes}
+        self._running = False
         self._sim: PickSim | None = None
         self._views: dict[str, View] = {}
         self._window: Window | None = None
@@ -152,6 +152,7 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         self.scene = sample_scene(self.scenario, self.np_random)
         self._errors = sensors.draw_episode_errors(self.noise, self._noise_rng)
         self.sim.reset(self.scene)
+        self._running = True
         self._steps = 0
         self._steps_lifted = 0
         self._collided = False
@@ -216,31 +217,14 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             self._window.close()
             self._window = None
         self._sim = None
+        self._running = False
 
-    def get_state(self) -> EnvState:
-        """All that the rest of the episode depends on: simulation, controller, generators, movers, perception inside.
+    def _state_arguments(self) -> dict[str, Any]:
+        render = {"render_mode": self.render_mode, "render_view": self.render_view}
+        return {**self._arguments, **render, "scenario": self.scenario}
 
-        What wrappers keep, such as the steps that ``TimeLimit`` has counted, is not in it.
-
-        Raises:
-            gymnasium.error.ResetNeeded: before the first reset, and after ``close``.
-        """
-        self._require_reset()
-        return pack(self._settings, self._episode())
-
-    def set_state(self, state: EnvState) -> None:
-        """Go on from a state, bit by bit as the environment that it was taken from, also in another process.
-
-        Raises:
-            ValueError: if it is of another version, or of an environment with other arguments.
-        """
-        self._continue(unpack(state, self._settings))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles go on in mid-episode; simulation and views are built again."""
-        started = self._sim is not None and self.scene is not None
-        arguments = {**self._settings, "render_mode": self.render_mode, "render_view": self.render_view}
-        return _made_again, (type(self), arguments, self.get_state() if started else None)
+    def _state_settings(self) -> dict[str, Any]:
+        return {**self._arguments, "scenario": self.scenario, "robot": ROBOT.simulated.robot}
 
     def _episode(self) -> dict[str, Any]:
         return {"sim": self.sim.get_state(), **{name: getattr(self, name) for name in _EPISODE}}
@@ -250,15 +234,11 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
         for name in _EPISODE:
             setattr(self, name, episode[name])
 
-    def _require_reset(self) -> None:
-        if self._sim is None or self.scene is None:
-            raise gym.error.ResetNeeded("call reset() first: after gym.make, and again after close()")
-
     # -- for checkers, privileged policies and experiments -------------------------------------------------------
 
     @property
     def sim(self) -> PickSim:
-        """The simulation, built at first use: GL and model must not exist before a worker process starts."""
+        """The simulation, built at first use: workers build their own."""
         if self._sim is None:
             from fixation_gym.gl import select_backend
 
@@ -354,10 +334,3 @@ class FixationPickEnv(gym.Env[dict[str, Any], np.ndarray]):
             "fixation_error_px": np.float64(offset),
             "reward_terms": terms,
         }
-
-
-def _made_again(make: type[FixationPickEnv], arguments: dict[str, Any], state: EnvState | None) -> FixationPickEnv:
-    env = make(**arguments)
-    if state is not None:
-        env.set_state(state)
-    return env

@@ -8,7 +8,6 @@ optical camera frame.
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +28,7 @@ from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 _JOINTS = ROBOT.arm.joints
-_COUNTS = ("nbody_awake", "ntree_awake", "nv_awake", "nparent_awake")
+_NUMBERS = ("time", "nbody_awake", "ntree_awake", "nv_awake", "nparent_awake")
 _OPEN = 0.5 * ROBOT.hand.opening
 """Way of one finger, m."""
 
@@ -52,10 +51,10 @@ class SimState:
     """What the simulation's future depends on."""
 
     scene: SceneSpec
-    data: Any
-    """A copy of the ``mjData``. Places and speeds would not do: bodies that sleep, and how long others rest, count."""
-    awake: tuple[int, ...]
-    """Its ``_COUNTS``, which a pickle of it forgets."""
+    arrays: dict[str, FloatArray]
+    """Of ``mjData``. Places and speeds would not do: bodies that sleep count, and how long others have rested."""
+    numbers: dict[str, Any]
+    """``_NUMBERS`` of it."""
     joint_command: FloatArray
     movers: tuple[tuple[bool, float], ...]
 
@@ -77,7 +76,7 @@ class PickSim:
             posture: joint angles from which start poses are sought and towards which the redundancy drifts, rad.
         """
         self._posture = np.array(posture)
-        self._control_frequency, self._extend = control_frequency, extend
+        self._extend = extend
         self._compiled = compile_model(extend)
         self.model: Any = self._compiled.model
         self.data: Any = self._compiled.data
@@ -95,6 +94,7 @@ class PickSim:
         joints = np.array([posture, *self._limits, *model.actuator_ctrlrange[self._arm].T])
         self._task = ArmTask(ROBOT.camera.hand_eye, joints, model.opt.timestep)
         self._arm_dynamics = self._view_arm()
+        self._arrays = _arrays_of(mujoco.MjData(model))
         self._loader = SceneLoader(model)
         self._display: tuple[Any, SceneLoader] | None = None
         self._joint_command = np.zeros(_JOINTS)
@@ -209,16 +209,18 @@ class PickSim:
 
     def get_state(self) -> SimState:
         """What its future depends on; call it after a reset."""
-        counts = tuple(getattr(self.data, name) for name in _COUNTS)
+        arrays = {name: getattr(self.data, name).copy() for name in self._arrays}
+        numbers = {name: getattr(self.data, name) for name in _NUMBERS}
         movers = tuple(mover.state for mover in self._movers)
-        return SimState(self._scene, copy.copy(self.data), counts, self._joint_command.copy(), movers)
+        return SimState(self._scene, arrays, numbers, self._joint_command.copy(), movers)
 
     def set_state(self, state: SimState) -> None:
         """Go on from there, bit by bit as the simulation that it was taken from."""
         self.reset(state.scene)
-        for name, count in zip(_COUNTS, state.awake, strict=True):
-            setattr(state.data, name, count)
-        mujoco.mj_copyData(self.data, self.model, state.data)
+        for name, number in state.numbers.items():
+            setattr(self.data, name, number)
+        for name, array in state.arrays.items():
+            getattr(self.data, name)[...] = array
         self._joint_command[:] = state.joint_command
         for mover, value in zip(self._movers, state.movers, strict=True):
             mover.state = value
@@ -269,3 +271,10 @@ class PickSim:
     def clearance(self) -> float:
         """Smallest distance between robot and obstacles, m, at most ``contacts.LARGEST_CLEARANCE``."""
         return contacts.clearance(self.model, self.data, *self._colliding)
+
+
+def _arrays_of(fresh: Any) -> tuple[str, ...]:
+    """Names of the arrays of an ``mjData`` whose size the model gives. A fresh one has none of the others: contacts."""
+    names = (name for name in dir(fresh) if not name.startswith("_"))
+    arrays = {name: value for name in names if isinstance(value := getattr(fresh, name), np.ndarray)}
+    return tuple(name for name, value in arrays.items() if value.size and value.dtype.kind in "fiub")

@@ -10,7 +10,6 @@ import cv2
 import mujoco
 import numpy as np
 
-from fixation_gym import gl
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.envs.contacts import OBSTACLE, geom_owners
 from fixation_gym.envs.rendering import View
@@ -62,7 +61,6 @@ class ObstacleDepth:
         self._renderer.enable_depth_rendering()
         depth = self._renderer.render()
         self._renderer.disable_depth_rendering()
-        gl.release_context()
         return depth
 
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import atexit
 import math
 import os
 import sys
@@ -16,6 +15,7 @@ import numpy as np
 
 from fixation_gym import gl
 from fixation_gym.envs import scene_mjcf
+from fixation_gym.envs.offscreen import Offscreen
 from fixation_gym.types import FloatArray, ImageArray
 
 _WALL_TOP, _FARTHEST_WALL = 2.95, 5.2
@@ -45,7 +45,6 @@ class View:
         Raises:
             RuntimeError: in a process forked from one that has rendered, where GL would wait for ever.
         """
-        gl.require_own_context()
         # Perception needs anti-aliasing: without it static edges flicker and read as motion. In software GL, twice the
         # resolution averaged down costs less than four samples per pixel; people get both samples and shadows.
         self._size = (height, width)
@@ -57,10 +56,10 @@ class View:
         model.vis.quality.shadowsize = 1024
         if not full_quality:  # boxes are lit at corners of so many quads along a side: more show in highlights only
             model.vis.quality.numquads = min(model.vis.quality.numquads, 2)
-        self._renderer = mujoco.Renderer(model, *fine)
-        gl.note_context()
+        self._renderer = Offscreen(model, *fine)
         if factor > 1:
-            _take_nearest_texels(self._renderer, model)
+            with gl.borrowed_thread():
+                _take_nearest_texels(self._renderer, model)
         self._pixels = np.empty((*fine, 3), np.uint8)
         self._model = model
         # Images are taken of a copy, so that an exposure before the end of the period leaves the physics untouched.
@@ -73,12 +72,9 @@ class View:
         self._full_quality = full_quality
         self._camera_id = model.camera(camera).id
         self._border = _border_rays(math.radians(model.cam_fovy[self._camera_id]), width / height)
-        gl.release_context()
-        # Freed before EGL shuts down, which MuJoCo registered when it made the context; later, EGL complains.
-        atexit.register(self._close_at_exit)
 
     @property
-    def renderer(self) -> mujoco.Renderer:
+    def renderer(self) -> Offscreen:
         """Lent to other pictures of the same size: a GL context of their own would copy all meshes and textures."""
         return self._renderer
 
@@ -97,7 +93,6 @@ class View:
         # The sky costs a millisecond even where it is hidden. A mirror may show it from anywhere.
         flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = int(self._full_quality or with_reflections or self._looks_up())
         self._renderer.render(out=self._pixels)
-        gl.release_context()
         height, width = self._size
         if self._full_quality:
             return self._pixels.copy()
@@ -111,20 +106,10 @@ class View:
 
     def close(self) -> None:
         """Free the GL context; may be called twice."""
-        atexit.unregister(self._close_at_exit)
         self._renderer.close()
 
-    def _close_at_exit(self) -> None:
-        """Free the GL context, unless another library, such as robosuite, has shut EGL down and it with that."""
-        try:
-            self.close()
-        except Exception:  # PyOpenGL's, which may be unloaded by now
-            if self._renderer._gl_context is not None:
-                self._renderer._gl_context._context = None
-            self._renderer._gl_context = self._renderer._mjr_context = None
 
-
-def _take_nearest_texels(renderer: mujoco.Renderer, model: Any) -> None:
+def _take_nearest_texels(renderer: Offscreen, model: Any) -> None:
     """Sample far textures at the nearest texel of the nearest resolution instead of blending eight of them.
 
     Several samples per pixel blend already; in software GL this saves a fifth of the time of a picture.

@@ -34,18 +34,11 @@ SceneExtension = Callable[[ET.Element, ET.Element], None]
 """Adds an experiment's own things to the MJCF elements ``asset`` and ``worldbody``."""
 
 
-class _Scene(ManipulationTask):
-    """Arena and robot as one model."""
-
-    def generate_id_mappings(self, sim: Any) -> None:
-        """Nothing here uses robosuite's segmentation, which asks for geoms that ``remove_looks`` takes out."""
-
-
 def build_xml(extend: SceneExtension | None, looks: bool) -> str:
     """The robot at a table with the object pool, as MJCF.
 
     Of robosuite only the models are used. Its environments, controllers and bindings would build a second model of the
-    robot, take ten times as long, and do not run with MuJoCo 4.
+    robot, take ten times as long, and do not run with MuJoCo 3.10 or newer.
 
     Args:
         extend: adds an experiment's own things to the model.
@@ -53,7 +46,7 @@ def build_xml(extend: SceneExtension | None, looks: bool) -> str:
     """
     arena = TableArena(table_full_size=_TABLE_SIZE, table_offset=_TABLE_OFFSET)
     arena.set_origin([0, 0, 0])
-    model = _Scene(mujoco_arena=arena, mujoco_robots=[_robot()])
+    model = ManipulationTask(mujoco_arena=arena, mujoco_robots=[_robot()])
     scene_mjcf.add_materials(model.asset, lambda file: xml_path_completion(f"textures/{file}"))
     worldbody = model.worldbody
     hand = next(body for body in worldbody.iter("body") if body.get("name") == HAND_BODY)

@@ -8,7 +8,6 @@ counts as a surface, too; what it reflects is found by following the reflected r
 
 from __future__ import annotations
 
-import atexit
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fixation_gym.envs import scene_mjcf
+from fixation_gym.envs.offscreen import Offscreen
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.types import FloatArray, MaskArray
 
@@ -54,7 +54,7 @@ class TruthView:
         height, width = intrinsics.height, intrinsics.width
         model.vis.global_.offheight, model.vis.global_.offwidth = height, width
         model.vis.quality.offsamples = 0
-        self._renderer = mujoco.Renderer(model, height, width)
+        self._renderer = Offscreen(model, height, width)
         self._model, self._data = model, mujoco.MjData(model)
         self._camera = model.camera(scene_mjcf.CAMERA_NAME).id
         self._option = mujoco.MjvOption()
@@ -64,7 +64,6 @@ class TruthView:
         self._mirror_material = model.mat(mirror_material).id
         x, y = intrinsics.grid
         self._rays = np.stack([x, -y, -np.ones_like(x)], axis=-1)  # MuJoCo's cameras look along -z, y up
-        atexit.register(self.close)
 
     def look(self, qpos: FloatArray) -> Truth:
         """Truth of a configuration."""
@@ -134,5 +133,4 @@ class TruthView:
 
     def close(self) -> None:
         """Free the GL context; may be called twice."""
-        atexit.unregister(self.close)
         self._renderer.close()

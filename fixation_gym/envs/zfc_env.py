@@ -73,8 +73,8 @@ class FixationPickZFC(FixationPickEnv):
     | 19 | opening between the finger pads | m |
     | 20-23 | stage of the manoeuvre: grasp, close, lift, recover; one is 1, or all 0 when the next action counts | - |
 
-    Everything but ``true_map`` comes from the sensors. Maps are numbers and no images, for libraries have nets for
-    images that a map is too small for. Rewards, end, ``info`` and rendering are those of ``FixationPick-v0``.
+    Everything but ``true_map`` comes from the sensors. Maps are floats: as images they would be too small for the
+    networks of common libraries. Rewards, end, ``info`` and rendering are those of ``FixationPick-v0``.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class FixationPickZFC(FixationPickEnv):
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = zfc_observation_space(observation, (self.intrinsics.height, self.intrinsics.width))
         self._shown = observation
-        self._settings["observation"] = observation
+        self._arguments["observation"] = observation
         self._truth: ObstacleDepth | None = None
         detector = BoxTracker(self.intrinsics) if self.scenario.any_colour else None
         table = ROBOT.workspace.table_height
@@ -148,6 +148,11 @@ class FixationPickZFC(FixationPickEnv):
         command = self._fixator.steer(action[:3] * ROBOT.arm.linear_speed, grasp=bool(action[3] > 0.0))
         sensed, reward, terminated, truncated, info = super().step(action_of(command))
         return self._perceived(sensed, info), reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """See ``FixationPickEnv.close``."""
+        self._truth = None
+        super().close()
 
     def _episode(self) -> dict[str, Any]:
         return {**super()._episode(), "fixator": self._fixator}

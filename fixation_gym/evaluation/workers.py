@@ -112,9 +112,8 @@ def run_cells(
     import joblib
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    # Workers inherit these. More threads than cores only get into each other's way, software rendering's included.
-    for variable in ("OMP_NUM_THREADS", "LP_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
+    # Workers inherit this. More threads than cores only get into each other's way.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     if backend == "loky":
         parallel = joblib.Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered")
         try:

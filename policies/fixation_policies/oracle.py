@@ -35,8 +35,9 @@ _MOVED = 0.02
 _NEAR_ANGLE, _NEAR_ROLL = math.radians(2.0), math.radians(3.0)
 """It goes in when it looks along its way this nearly, and its hand is turned as the grasp needs: a hand that turns on
 the way in meets what stands beside the way."""
-_ARRIVED = 0.0015
-"""The fingers close within this of their goal, m: a thin thing that is held above its middle slips."""
+_ARRIVED, _BACK = 0.0015, 0.003
+"""The fingers close within this of their goal, m: a thin thing that is held above its middle slips. Backing off need
+not be so exact."""
 _PHASES = ("fixate", "approach", "grasp", "close", "lift")
 
 
@@ -94,21 +95,22 @@ class OraclePolicy:
             self._aim_at(pose, target, time)
             if self._phase == "grasp":
                 self._begin("recover", pose, target, time)
-            elif self._angle(pose, target) > _NEAR_ANGLE:
+            elif not self._is_lined_up(pose, target):
                 self._begin("fixate", pose, target, time)
             return
         held = np.linalg.norm(target - self._env.sim.tool_position()) < _HELD
         if self._phase in ("close", "lift") and elapsed > _GAINS.close_seconds and not held:
             self._begin("recover", pose, target, time)
             return
-        arrived = float(np.linalg.norm(self._goal - pose[:3, 3])) < _ARRIVED
+        left = float(np.linalg.norm(self._goal - pose[:3, 3]))
+        arrived, near = left < _ARRIVED, left < _BACK
         done = {
             "fixate": self._is_lined_up(pose, target) or elapsed > 8.0,
             "approach": distance < GRASP_DISTANCE * 1.03,
             "grasp": arrived or elapsed > 4.0,
             "close": elapsed > _GAINS.close_seconds,
             "lift": False,
-            "recover": arrived or elapsed > 3.0,
+            "recover": near or elapsed > 3.0,
         }[self._phase]
         if done and self._phase == "recover":
             self._aim_at(pose, target, time)

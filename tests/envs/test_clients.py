@@ -20,7 +20,8 @@ SMALL = (64, 80)
 
 def python(code):
     """What a fresh process prints and complains about; it has two minutes."""
-    inherited = {key: value for key, value in os.environ.items() if key != "LP_NUM_THREADS"}
+    ours = ("LP_NUM_THREADS", "MUJOCO_GL", "PYOPENGL_PLATFORM", "FIXATION_GYM_GL")
+    inherited = {key: value for key, value in os.environ.items() if key not in ours}
     return subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],
         capture_output=True,
@@ -126,15 +127,27 @@ def test_two_environments_each_in_a_thread_see_what_they_see_alone():
         env.close()
 
 
-def test_an_environment_left_open_beside_robosuites_ends_without_a_word():
-    code = """
-import gymnasium as gym, robosuite, fixation_gym
-env = gym.make("FixationPick-v0", image_size=(64, 80)); env.reset(seed=0)
-other = robosuite.make("Lift", robots="Panda", has_renderer=False, has_offscreen_renderer=True, use_camera_obs=True,
-                       camera_heights=64, camera_widths=64)
-other.reset()
+ROBOSUITE = """
+import gymnasium as gym, numpy as np, fixation_gym
+from fixation_gym.gl import PROBE_MODEL
+env = gym.make("FixationPick-v0", image_size=(64, 80))
+env.reset(seed=0)
+from robosuite.utils.binding_utils import MjRenderContextOffscreen, MjSim
+sim = MjSim.from_xml_string(PROBE_MODEL)
+sim.forward()
+context = MjRenderContextOffscreen(sim, device_id=-1)
+def picture():
+    context.render(32, 32, camera_id=0)
+    return context.read_pixels(32, 32).copy()
+before = picture()
+env.step(env.action_space.sample())
+print(before.std() > 0 and (picture() == before).all())
 """
-    result = python(code)
+
+
+def test_robosuite_renders_between_our_steps_and_the_program_ends_without_a_word():
+    result = python(ROBOSUITE)
+    assert result.stdout.splitlines()[-1:] == ["True"], result.stderr
     assert result.returncode == 0, result.stderr
     assert "Error" not in result.stderr
 

@@ -8,7 +8,7 @@ import pytest
 import fixation_gym  # noqa: F401
 
 pytestmark = pytest.mark.sim
-HEAVY = ("PickSim", "TaskModel", "View", "_FixationPickTask", "MjModel", "MjData", "MjrContext", "GLContext")
+HEAVY = ("PickSim", "TaskModel", "View", "MjModel", "MjData", "MjrContext", "GLContext")
 
 
 def heavy_objects():

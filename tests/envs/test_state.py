@@ -63,11 +63,30 @@ def test_an_episode_goes_on_from_a_state_and_the_next_ones_are_the_same_too(env)
     assert env.scene == next_scene
 
 
-def test_a_copy_goes_on_by_itself(env):
+def test_a_copy_goes_on_by_itself_and_draws_the_same_scenes(env):
     steps = actions(env, 1, 6)
     other = copy.deepcopy(env)
+    assert other.np_random_seed == env.np_random_seed == 7
     assert_same(walk(other, steps), walk(env, steps))
+    other.reset()
+    env.reset()
+    assert other.scene == env.scene
     other.close()
+
+
+def test_an_environment_that_was_closed_goes_on_from_a_state(env):
+    state, steps = env.get_state(), actions(env, 1, 3)
+    first = walk(env, steps)
+    env.close()
+    assert env.sim.model.nbody > 0  # a look at the simulation is no reset
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(steps[0])
+    env.set_state(state)
+    assert_same(walk(env, steps), first)
+
+
+def test_a_state_is_small(env):
+    assert len(pickle.dumps(env.get_state())) < 4e6
 
 
 def test_another_process_goes_on_from_a_pickle(tmp_path):

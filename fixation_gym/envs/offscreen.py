@@ -1,0 +1,61 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's functions have no type stubs.)
+"""MuJoCo's off-screen renderer as a good neighbour: of other libraries, of threads and of forked processes."""
+
+from __future__ import annotations
+
+import atexit
+import os
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fixation_gym import gl
+
+
+class Offscreen(mujoco.Renderer):
+    """Renders in a GL context that is current only meanwhile. Create lazily: a context holds all textures."""
+
+    def __init__(self, model: Any, height: int, width: int) -> None:
+        """Open a GL context.
+
+        Raises:
+            RuntimeError: in a process forked from one that has rendered, where GL would wait for ever.
+        """
+        self._gl_context = self._mjr_context = None  # there is nothing to close yet
+        gl.require_own_context()
+        self._process = os.getpid()
+        with gl.borrowed_thread():
+            super().__init__(model, height, width)
+            gl.note_context()
+        # Freed before EGL shuts down, which MuJoCo registered when it made the context; later, EGL complains.
+        atexit.register(self._close_at_exit)
+
+    def render(self, *, out: np.ndarray | None = None) -> np.ndarray:
+        """Picture of the scene as it was last updated; see ``mujoco.Renderer.render``.
+
+        Raises:
+            RuntimeError: in a process forked since the context was opened, where GL would wait for ever.
+        """
+        if os.getpid() != self._process:
+            gl.require_own_context()
+        with gl.borrowed_thread():
+            return super().render(out=out)
+
+    def close(self) -> None:
+        """Free the GL context; may be called twice."""
+        if self._gl_context is None:
+            return
+        atexit.unregister(self._close_at_exit)
+        with gl.borrowed_thread():
+            super().close()
+
+    def _close_at_exit(self) -> None:
+        """Free the GL context, unless another library, such as robosuite, has shut EGL down and it with that."""
+        try:
+            self.close()
+        except Exception:  # PyOpenGL's, which may be unloaded by now
+            if self._gl_context is not None:
+                self._gl_context._context = None
+            self._gl_context = self._mjr_context = None
