@@ -89,6 +89,7 @@ class PickSim:
         assert np.allclose(self.data.xmat[base].reshape(3, 3), np.eye(3)), "base frame is assumed parallel to the world"
         self._arm = slice(0, _JOINTS)
         self._fingers = slice(_JOINTS, _JOINTS + 2)
+        self.data.qpos[self._arm], self.data.qpos[self._fingers] = posture, [_OPEN, -_OPEN]
         lower, upper = model.jnt_range[self._arm].T
         self._limits = JointLimits(lower + 0.02, upper - 0.02, np.array(ROBOT.arm.joint_speeds))
         joints = np.array([posture, *self._limits, *model.actuator_ctrlrange[self._arm].T])
