@@ -64,6 +64,7 @@ class View:
         self._model = model
         # Images are taken of a copy, so that an exposure before the end of the period leaves the physics untouched.
         self._data = mujoco.MjData(model)
+        self._fixed_lights = np.flatnonzero(model.light_bodyid == 0)
         self._camera = camera
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
@@ -82,6 +83,8 @@ class View:
         """Image of the configuration, shape (H, W, 3), top-left origin."""
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
+        # Every scene has its own light; MuJoCo 4 computes once what does not move.
+        self._data.light_xdir[self._fixed_lights] = self._model.light_dir[self._fixed_lights]
         mujoco.mj_camlight(self._model, self._data)
         # The robot is behind its wrist camera; only a mirror shows it, where a coarse one does.
         self._option.geomgroup[scene_mjcf.ROBOT_GROUP] = int(self._full_quality)
