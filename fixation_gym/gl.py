@@ -90,8 +90,8 @@ def _set_mesa_defaults() -> None:
     """Defaults for Mesa's software renderer, which reads them when the first context is made."""
     global _has_threads
     if "LP_NUM_THREADS" not in os.environ:
-        # Threads of its own do not survive a fork: the child then hangs. At the sizes of a wrist camera they save
-        # little.
+        # Threads of its own do not survive a fork: the child then hangs. One environment alone would be faster with
+        # them, workers beside each other are not; see docs/clients.md.
         os.environ["LP_NUM_THREADS"] = "0"
         _has_threads = any(getattr(sys.modules.get(name), "EGL_DISPLAY", None) for name in _EGL_MODULES)
     # Cheaper blends between a texture's resolutions save a fifth of the time of a picture.

@@ -6,13 +6,12 @@ import pickle
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
+from functools import cache
 from typing import Any
 
 from gymnasium.error import ResetNeeded
 
-_WRITTEN_BY = f"fixation-gym {version('fixation-gym')}, MuJoCo {version('mujoco')}"
-"""States are read by the versions that wrote them only: what they hold is the inside of simulation and perception."""
+from fixation_gym.doctor import installed_versions
 
 
 @dataclass(frozen=True)
@@ -26,9 +25,16 @@ class EnvState:
     """A pickle: set states from sources you trust only."""
 
 
+@cache
+def _written_by() -> str:
+    """States are read by the versions that wrote them only: they hold the inside of simulation and perception."""
+    versions = installed_versions()
+    return f"fixation-gym {versions.get('fixation-gym', 'not installed')}, MuJoCo {versions.get('mujoco')}"
+
+
 def pack(settings: Mapping[str, Any], parts: Mapping[str, Any]) -> EnvState:
     """A state that shares nothing with the environment that it is taken from."""
-    return EnvState(_WRITTEN_BY, dict(settings), pickle.dumps(parts))
+    return EnvState(_written_by(), dict(settings), pickle.dumps(parts))
 
 
 def unpack(state: EnvState, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -39,8 +45,10 @@ def unpack(state: EnvState, settings: Mapping[str, Any]) -> dict[str, Any]:
     """
     if not isinstance(state, EnvState):
         raise ValueError(f"set_state needs what get_state returned, got {type(state).__name__}")
-    if state.written_by != _WRITTEN_BY:
-        raise ValueError(f"this state was written by {state.written_by}, but this is {_WRITTEN_BY}; take it again here")
+    if state.written_by != _written_by():
+        raise ValueError(
+            f"this state was written by {state.written_by}, but this is {_written_by()}; take it again here"
+        )
     if state.settings.keys() != settings.keys():
         raise ValueError("this state is of another kind of environment: set it where it was taken, or in one like that")
     for name, value in settings.items():
