@@ -23,6 +23,9 @@ _NEIGHBOURHOOD = np.ones((5, 5), np.uint8)
 _CORE = np.ones((3, 3), np.uint8)
 """What of a pixel's surroundings must stand there, too: the window smears every outline by up to two pixels; what is
 thin appears as wide as the window, so something is left of it."""
+_GRID_BITS = 20
+"""Bits of a voxel's index along one axis: at 15 mm they reach 8 km, beyond any table."""
+_HALF_GRID = 1 << (_GRID_BITS - 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,7 @@ class ObstacleMemory:
     """Points and how often they were seen."""
 
     keys: NDArray[np.int64]
-    """Voxel indices, shape (n, 3), unique rows in lexicographic order."""
+    """Numbers of the voxels, shape (n,), in rising order."""
     points: FloatArray
     """Mean place of what was seen in each voxel, shape (n, 3), in base, m."""
     evidence: FloatArray
@@ -72,7 +75,7 @@ class ObstacleMemory:
     @classmethod
     def empty(cls, time: float = 0.0) -> ObstacleMemory:
         """Nothing seen yet."""
-        return cls(np.zeros((0, 3), np.int64), np.zeros((0, 3)), np.zeros(0), time)
+        return cls(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), time)
 
 
 def remember(
@@ -104,18 +107,20 @@ def remember(
     faded = faded * np.where(contradicted, settings.contradiction, 1.0)
     seen = _standing_points(zero_flow, intrinsics, T_base_cam, settings, support_height_m)
     new_keys, new_points = _by_voxel(seen, settings.voxel_m)
-    keys, index = np.unique(np.concatenate([memory.keys, new_keys]), axis=0, return_inverse=True)
+    keys, index = np.unique(np.concatenate([memory.keys, new_keys]), return_inverse=True)
     weights = np.concatenate([faded, np.ones(len(new_keys))])
-    evidence, points = _sums(index.ravel(), weights, np.concatenate([memory.points, new_points]), len(keys))
+    evidence, points = _sums(index, weights, np.concatenate([memory.points, new_points]), len(keys))
     keep = evidence > settings.forget_below
     evidence = np.minimum(evidence[keep], settings.saturation)
     return ObstacleMemory(keys[keep], points[keep], evidence, time)
 
 
 def _by_voxel(points: FloatArray, voxel_m: float) -> tuple[NDArray[np.int64], FloatArray]:
-    """Voxel indices of points, unique, shape (n, 3), and the mean of the points in each, shape (n, 3)."""
-    keys, index = np.unique(np.floor(points / voxel_m).astype(np.int64), axis=0, return_inverse=True)
-    return keys, _sums(index.ravel(), np.ones(len(points)), points, len(keys))[1]
+    """Numbers of the voxels that hold points, unique, shape (n,), and the mean of the points in each, shape (n, 3)."""
+    x, y, z = (np.clip(np.floor(points / voxel_m), -_HALF_GRID, _HALF_GRID - 1).astype(np.int64) + _HALF_GRID).T
+    # One number for each: rows of three are sorted five times as slowly.
+    keys, index = np.unique((x << 2 * _GRID_BITS) | (y << _GRID_BITS) | z, return_inverse=True)
+    return keys, _sums(index, np.ones(len(points)), points, len(keys))[1]
 
 
 def _sums(
