@@ -8,6 +8,7 @@ optical camera frame.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,10 @@ _JOINTS = ROBOT.arm.joints
 _NUMBERS = ("time", "nbody_awake", "ntree_awake", "nv_awake", "nparent_awake")
 _OPEN = 0.5 * ROBOT.hand.opening
 """Way of one finger, m."""
+_START_TOLERANCE = 2e-3
+"""Of the camera's pose at the start, m and rad."""
+_LONGEST_STEPS = (math.inf, 0.1, 0.02)
+"""Bounds on a step of the inverse kinematics, m and rad: whole steps are quick, but may end in a folded arm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +159,16 @@ class PickSim:
 
     def _inverse_kinematics(self, T_base_cam: FloatArray) -> FloatArray:
         """Joint angles that bring the camera to a pose."""
+        for longest in _LONGEST_STEPS:
+            joints, error = self._approached(T_base_cam, longest)
+            if error < _START_TOLERANCE:
+                return joints
+        raise RuntimeError(f"the arm cannot reach the camera pose at {np.round(T_base_cam[:3, 3], 3).tolist()}")
+
+    def _approached(self, T_base_cam: FloatArray, longest: float) -> tuple[FloatArray, float]:
+        """Joint angles for a pose after some iterations, and what is left of the error, in m and rad together."""
         limits = self._limits
-        joints, error = self._posture.copy(), np.full(6, np.inf)
+        joints, left = self._posture.copy(), math.inf
         for iteration in range(100):
             self.data.qpos[self._arm] = joints
             mujoco.mj_kinematics(self.model, self.data)
@@ -165,14 +178,14 @@ class PickSim:
             # Axis times the sine of the angle: right to first order, which is what the iteration needs.
             sine = 0.5 * (turn - turn.T)
             error = np.array([*offset, sine[2, 1], sine[0, 2], sine[1, 0]])
-            if np.linalg.norm(error) < 1e-6:
-                return joints
+            left = float(np.linalg.norm(error))
+            if left < 1e-6:
+                break
             posture_gain = 0.5 if iteration < 6 else 0.0  # the drift slows the convergence that then follows
-            step = joint_velocities(state.jacobian, error, joints, self._posture, limits, 1e-3, posture_gain, 1.0)
+            towards = error * min(1.0, longest / left)
+            step = joint_velocities(state.jacobian, towards, joints, self._posture, limits, 1e-3, posture_gain, 1.0)
             joints = np.clip(joints + step, limits.lower, limits.upper)
-        if np.linalg.norm(error) > 2e-3:
-            raise RuntimeError(f"the arm cannot reach the camera pose at {np.round(T_base_cam[:3, 3], 3).tolist()}")
-        return joints
+        return joints, left
 
     def step(self, camera_twist: FloatArray, gripper: float, exposure_substep: int) -> tuple[FloatArray, bool]:
         """Run one control period.
