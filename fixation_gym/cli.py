@@ -90,7 +90,7 @@ class Evaluate(EvaluationConfig):
         if self.film_failures:
             from fixation_gym.evaluation.clips import film_failures
 
-            print_different(film_failures(self.out, self.workers, self.backend))
+            print_different(film_failures(self.out, self.episode_keys(), self.workers, self.backend))
         print(format_table(summary["scenarios"]))
         print(f"\n{self.out / SUMMARY_FILE}")
         return 0

@@ -64,7 +64,7 @@ class Ablate:
         from fixation_gym.reporting.report import REPORT_FILE
 
         chosen = tuple(dict.fromkeys((VARIANT_NAMES[0], *names)))
-        summary, different = ablate(config, chosen, self.out, self.gallery, self.film_failures)
+        _, summary, different = ablate(config, chosen, self.out, self.gallery, self.film_failures)
         print_different(different)
         print(format_ablations(summary, {variant.name: variant.summary for variant in VARIANTS}))
         print(f"\n{self.out / REPORT_FILE}")

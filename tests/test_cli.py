@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +122,7 @@ def test_failures_are_filmed_if_asked(
 ) -> None:
     filmed: list[Path] = []
 
-    def film(folder: Path, processes: int, backend: str) -> list[Any]:
+    def film(folder: Path, keys: Sequence[Any], processes: int, backend: str) -> list[Any]:
         filmed.append(folder)
         return []
 
@@ -140,7 +141,7 @@ def test_ablate_always_runs_the_full_servo_first(
 
     def fake_ablate(config: EvaluationConfig, variants: tuple[str, ...], *rest: Any) -> Any:
         seen.append(variants)
-        return {"policies": {}, "success_differences": []}, []
+        return [], {"policies": {}, "success_differences": []}, []
 
     monkeypatch.setattr(ablation, "ablate", fake_ablate)
     assert cli.main(["ablate", "--out", str(tmp_path), "--variant", "servo:no_retry,blind"]) == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.failures import classify
 from fixation_gym.evaluation.files import write_file
 from fixation_gym.evaluation.folders import Evaluation, read_evaluation
-from fixation_gym.evaluation.rollout import EpisodeResult, run_episode
+from fixation_gym.evaluation.rollout import EpisodeKey, EpisodeResult, run_episode
 from fixation_gym.evaluation.storage import folder_lock, make_folder
 from fixation_gym.evaluation.trace import Trace
 from fixation_gym.evaluation.video import caption, contact_sheet, jpeg, shrink
@@ -34,6 +34,7 @@ def clip_file(folder: Path, scenario: str, seed: int) -> Path:
 
 def film_failures(
     folder: Path,
+    keys: Collection[EpisodeKey] | None = None,
     processes: int = 1,
     backend: str = "loky",
     run: Callable[[workers.Cell], dict[str, Any]] | None = None,
@@ -42,6 +43,7 @@ def film_failures(
 
     Args:
         folder: of a finished evaluation; must not be in use.
+        keys: (scenario, seed) of the episodes asked for; None for all.
         processes: number of worker processes.
         backend: where they run, see ``workers``.
         run: films one cell; tests replace it.
@@ -53,13 +55,9 @@ def film_failures(
         UsageError: if the folder cannot be used.
     """
     with folder_lock(folder):
-        evaluation = read_evaluation(folder)
+        evaluation = read_evaluation(folder, keys)
         failed = [result for result in evaluation.results if not result.collision_free_success]
-        missing = {
-            (result.scenario, result.seed): result
-            for result in failed
-            if not clip_file(folder, result.scenario, result.seed).exists()
-        }
+        missing = {result.key: result for result in failed if not clip_file(folder, *result.key).exists()}
         if missing:
             make_folder(folder / CLIPS_FOLDER)
         cells = [_cell(evaluation, result) for result in missing.values()]
@@ -70,8 +68,8 @@ def film_failures(
             for film in films:
                 sheet = film.pop("sheet")
                 again = EpisodeResult.from_json(film)
-                if again == missing[again.scenario, again.seed]:
-                    write_file(clip_file(folder, again.scenario, again.seed), sheet)
+                if again == missing[again.key]:
+                    write_file(clip_file(folder, *again.key), sheet)
                 else:
                     different.append(again)
                 progress.update()

@@ -13,7 +13,7 @@ from fixation_gym.errors import UsageError, check_names
 from fixation_gym.names import Names
 
 if TYPE_CHECKING:
-    from fixation_gym.evaluation.storage import EpisodeKey
+    from fixation_gym.evaluation.rollout import EpisodeKey
     from fixation_gym.evaluation.workers import Cell
     from fixation_policies.catalogue import Surroundings
 

@@ -16,9 +16,9 @@ from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.report import summarise
-from fixation_gym.evaluation.rollout import EpisodeResult
+from fixation_gym.evaluation.rollout import EpisodeKey, EpisodeResult
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeKey, EpisodeStore
+from fixation_gym.evaluation.storage import SUMMARY_FILE, EpisodeStore
 
 
 def seed_hash(keys: Sequence[EpisodeKey]) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.rollout import EpisodeResult
-from fixation_gym.evaluation.storage import EPISODES_FILE, RUN_FILE, SUMMARY_FILE, EpisodeKey
+from fixation_gym.evaluation.rollout import EpisodeKey, EpisodeResult
+from fixation_gym.evaluation.storage import EPISODES_FILE, RUN_FILE, SUMMARY_FILE
 from fixation_gym.evaluation.trace import Trace, read_trace, trace_file
 
 
@@ -29,7 +29,7 @@ class Evaluation:
     @property
     def keys(self) -> list[EpisodeKey]:
         """(scenario, seed) of every result."""
-        return [(result.scenario, result.seed) for result in self.results]
+        return [result.key for result in self.results]
 
     def trace(self, result: EpisodeResult) -> Trace | None:
         """The trace of one of the results, read from its file; None if the episode has none.
@@ -37,11 +37,15 @@ class Evaluation:
         Raises:
             UsageError: if the file is damaged.
         """
-        return read_trace(trace_file(self.folder, result.scenario, result.seed))
+        return read_trace(trace_file(self.folder, *result.key))
 
 
-def read_evaluation(folder: Path) -> Evaluation:
+def read_evaluation(folder: Path, keys: Collection[EpisodeKey] | None = None) -> Evaluation:
     """Read what ``evaluate`` left in a folder.
+
+    Args:
+        folder: of a finished evaluation.
+        keys: (scenario, seed) of the episodes asked for; None for all, also those that an earlier call left.
 
     Raises:
         UsageError: if something is missing or damaged, naming it.
@@ -54,6 +58,9 @@ def read_evaluation(folder: Path) -> Evaluation:
     if not isinstance(summary.get("scenarios"), dict):
         raise UsageError(f"{folder / SUMMARY_FILE} lacks 'scenarios'; give a folder that evaluate wrote")
     results = _episodes(folder / EPISODES_FILE)
+    if keys is not None:
+        wanted = set(keys)
+        results = [result for result in results if result.key in wanted]
     if not results:
         raise UsageError(f"{folder / EPISODES_FILE} has no episodes")
     order = list(dict.fromkeys([*summary["scenarios"], *(result.scenario for result in results)]))
@@ -114,5 +121,5 @@ def _episodes(path: Path) -> list[EpisodeResult]:
             result = EpisodeResult.from_json(json.loads(line))
         except (ValueError, TypeError) as error:
             raise UsageError(f"{path}, line {number} is damaged") from error
-        results.setdefault((result.scenario, result.seed), result)
+        results.setdefault(result.key, result)
     return list(results.values())

@@ -22,6 +22,8 @@ GRASP = "grasp"
 GAZE_PHASES = ("fixate", APPROACH)
 """Phases in which a policy holds its gaze on the target."""
 
+EpisodeKey = tuple[str, int]
+"""(scenario, seed)"""
 FrameCallback = Callable[[NDArray[np.uint8]], None]
 
 
@@ -54,6 +56,11 @@ class EpisodeResult:
 
     trace: Trace | None = field(default=None, compare=False, repr=False)
     """What happened step by step, if known; it is kept in a file of its own."""
+
+    @property
+    def key(self) -> EpisodeKey:
+        """What tells the results of one run apart."""
+        return self.scenario, self.seed
 
     def to_json(self) -> dict[str, Any]:
         """A dict of JSON values, without the trace."""

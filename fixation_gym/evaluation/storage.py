@@ -19,15 +19,12 @@ from typing import Any, Generic, TypeVar
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.files import write_json
-from fixation_gym.evaluation.rollout import EpisodeResult
+from fixation_gym.evaluation.rollout import EpisodeKey, EpisodeResult
 from fixation_gym.evaluation.trace import TRACES_FOLDER, trace_file, write_trace
 
 RUN_FILE = "run.json"
 EPISODES_FILE = "episodes.jsonl"
 SUMMARY_FILE = "summary.json"
-
-EpisodeKey = tuple[str, int]
-"""(scenario, seed)"""
 
 Key = TypeVar("Key", bound=Hashable)
 Result = TypeVar("Result")
@@ -180,7 +177,7 @@ class EpisodeStore(ResultStore[EpisodeKey, EpisodeResult]):
             folder,
             run,
             EPISODES_FILE,
-            key=lambda result: (result.scenario, result.seed),
+            key=lambda result: result.key,
             from_json=EpisodeResult.from_json,
             to_json=EpisodeResult.to_json,
         )
@@ -188,7 +185,7 @@ class EpisodeStore(ResultStore[EpisodeKey, EpisodeResult]):
     def append(self, result: EpisodeResult) -> None:
         """Store a finished episode, its trace first: whatever has a line also has its trace."""
         if result.trace is not None:
-            write_trace(trace_file(self.folder, result.scenario, result.seed), result.trace)
+            write_trace(trace_file(self.folder, *result.key), result.trace)
         super().append(replace(result, trace=None))
 
 

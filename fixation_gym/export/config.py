@@ -10,7 +10,7 @@ from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.config import EvaluationConfig, episode_seeds
 
 if TYPE_CHECKING:
-    from fixation_gym.evaluation.storage import EpisodeKey
+    from fixation_gym.evaluation.rollout import EpisodeKey
 
 FORMATS = ("lerobot",)
 

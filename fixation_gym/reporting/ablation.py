@@ -11,9 +11,11 @@ from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.clips import film_failures
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.evaluate import evaluate
+from fixation_gym.evaluation.folders import read_evaluation
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.storage import make_folder
-from fixation_gym.reporting.report import check_report_folder, write_report
+from fixation_gym.reporting.digest import PolicyRecord, digest
+from fixation_gym.reporting.report import check_report, write_page
 
 TITLE = "Ablations of the servo"
 
@@ -26,8 +28,10 @@ def ablate(
     film: bool = False,
     run: Callable[[workers.Cell], dict[str, Any]] = workers.run_cell,
     title: str = TITLE,
-) -> tuple[dict[str, Any], list[EpisodeResult]]:
+) -> tuple[list[PolicyRecord], dict[str, Any], list[EpisodeResult]]:
     """Evaluate every variant in a folder of its own, then write their report. The same call resumes a killed one.
+
+    Of folders that hold more episodes, those that ``config`` asks for count.
 
     Args:
         config: what to evaluate; its policy is not used. Must have passed ``check`` with every variant.
@@ -39,25 +43,21 @@ def ablate(
         title: heading of the report.
 
     Returns:
-        The summary of the report, as in ``summary.json``, and episodes that could not be filmed.
+        The variants' episodes, the summary of their report, as in ``summary.json``, and what could not be filmed.
 
     Raises:
         UsageError: if a folder cannot be used.
     """
     make_folder(out)
-    check_report_folder(out)
-    folders = [out / variant_folder(name) for name in variants]
+    check_report(out, pictures)
+    folders = [out / name.replace(":", "-") for name in variants]
     for name, folder in zip(variants, folders, strict=True):
         evaluate(replace(config, policy=name), folder, run)
-    different = [
-        result for folder in folders if film for result in film_failures(folder, config.workers, config.backend)
-    ]
-    return write_report(folders, out, pictures, title), different
-
-
-def variant_folder(name: str) -> str:
-    """Name of the folder of a policy's results."""
-    return name.replace(":", "-")
+    keys, different = config.episode_keys(), []
+    for folder in folders if film else []:
+        different += film_failures(folder, keys, config.workers, config.backend)
+    records = digest([read_evaluation(folder, keys) for folder in folders])
+    return records, write_page(records, out, pictures, title), different
 
 
 def format_ablations(summary: Mapping[str, Any], summaries: Mapping[str, str]) -> str:

@@ -112,10 +112,8 @@ def _pairs(
     reference: PolicyRecord, other: PolicyRecord, scenario: str | None
 ) -> list[tuple[EpisodeResult, EpisodeResult]]:
     """Results on the same scenario and seed."""
-    theirs = {(result.scenario, result.seed): result for result in other.of(scenario)}
-    mine = reference.of(scenario)
-    keys = ((result, (result.scenario, result.seed)) for result in mine)
-    return [(result, theirs[key]) for result, key in keys if key in theirs]
+    theirs = {result.key: result for result in other.of(scenario)}
+    return [(result, theirs[result.key]) for result in reference.of(scenario) if result.key in theirs]
 
 
 def scaled(value: float | None, scale: float) -> float | None:

@@ -117,7 +117,7 @@ def _episodes(evaluation: Evaluation) -> tuple[Episode, ...]:
                 failure=classify(result, trace),
                 curves=None if trace is None else error_curves(trace),
                 has_trace=trace is not None and bool(trace.boxes),
-                has_clip=clip_file(evaluation.folder, result.scenario, result.seed).exists(),
+                has_clip=clip_file(evaluation.folder, *result.key).exists(),
             )
         )
     return tuple(episodes)

@@ -80,7 +80,7 @@ def _entry(record: PolicyRecord, item: FailedEpisode) -> Html:
         facts.append(f"distance error at grasp {1000 * error:.1f} mm")
     parts = [element("h4", title), element("p", "; ".join(facts), "note")]
     if item.episode.has_clip:
-        data = clip_file(folder, result.scenario, result.seed).read_bytes()
+        data = clip_file(folder, *result.key).read_bytes()
         parts.append(
             figure(image(data, "jpeg", f"Six moments of {result.scenario} seed {result.seed}", plot=False), "")
         )

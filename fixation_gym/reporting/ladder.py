@@ -9,13 +9,12 @@ from typing import Any
 from fixation_gym.evaluation import workers
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.files import write_csv, write_file
-from fixation_gym.evaluation.folders import read_evaluation
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.statistics import median, wilson_interval
 from fixation_gym.evaluation.storage import check_no_folders, make_folder
-from fixation_gym.reporting.ablation import ablate, variant_folder
+from fixation_gym.reporting.ablation import ablate
 from fixation_gym.reporting.comparison import ALL, compare_success
-from fixation_gym.reporting.digest import PolicyRecord, digest, scenario_names
+from fixation_gym.reporting.digest import PolicyRecord, scenario_names
 from fixation_gym.reporting.figures import new_figure, png
 
 TITLE = "From the paper's algorithm to the servo"
@@ -52,8 +51,7 @@ def climb(
     make_folder(out)
     check_no_folders(out, (LADDER_FILE, FIGURE_FILE))
     names = [*ladder, *beside]
-    ablate(config, names, out, pictures, run=run, title=TITLE)
-    records = digest([read_evaluation(out / variant_folder(name)) for name in names])
+    records, _, _ = ablate(config, names, out, pictures, run=run, title=TITLE)
     rows = [row for index, name in enumerate(names) for row in _rows(records, index, ladder.get(name, ""), len(ladder))]
     write_csv(out / LADDER_FILE, rows)
     write_file(out / FIGURE_FILE, ladder_figure([row for row in rows if row["scenario"] == ALL]))

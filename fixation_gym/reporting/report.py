@@ -45,13 +45,14 @@ def write_report(folders: Sequence[Path], out: Path, pictures: int, title: str) 
     Raises:
         UsageError: if a folder or a number cannot be used.
     """
-    if pictures < 0:
-        raise UsageError(f"--gallery must be 0 or more, got {pictures}")
-    records = digest([read_evaluation(folder) for folder in evaluation_folders(folders)])
-    check_report_folder(out)
+    check_report(out, pictures)
+    return write_page(digest([read_evaluation(folder) for folder in evaluation_folders(folders)]), out, pictures, title)
+
+
+def write_page(records: Sequence[PolicyRecord], out: Path, pictures: int, title: str) -> dict[str, Any]:
+    """As ``write_report``, of records; ``check_report`` has accepted the folder."""
     make_folder(out)
     with folder_lock(out):
-        check_no_folders(out, (REPORT_FILE, SUMMARY_FILE))
         text = report_page(records, title, pictures)
         summary = report_summary(records)
         try:
@@ -62,12 +63,15 @@ def write_report(folders: Sequence[Path], out: Path, pictures: int, title: str) 
     return summary
 
 
-def check_report_folder(out: Path) -> None:
-    """Check that a report may go to a folder.
+def check_report(out: Path, pictures: int) -> None:
+    """Check that a report with so many pictures may go to a folder.
 
     Raises:
-        UsageError: if results of an evaluation are there, whose summary it would replace.
+        UsageError: for a wrong number, or if something in the folder may not be replaced.
     """
+    if pictures < 0:
+        raise UsageError(f"--gallery must be 0 or more, got {pictures}")
+    check_no_folders(out, (REPORT_FILE, SUMMARY_FILE))
     for name in (RUN_FILE, EPISODES_FILE):
         if (out / name).exists():
             raise UsageError(f"{out} holds results of another command ({name}); choose another --out")

@@ -139,7 +139,7 @@ def _paths_of(records: Sequence[PolicyRecord], chosen: EpisodeResult) -> list[tu
     found = []
     for index, record in enumerate(records):
         for episode in record.episodes:
-            if (episode.result.scenario, episode.result.seed) == (chosen.scenario, chosen.seed) and episode.has_trace:
+            if episode.result.key == chosen.key and episode.has_trace:
                 trace = record.evaluation.trace(episode.result)
                 assert trace is not None, "it was there when the episodes were read"
                 found.append((record.label, colour_of(index), trace))

@@ -70,3 +70,11 @@ def test_a_killed_run_resumes(tmp_path: Path) -> None:
     rest: list[str] = []
     climb(config, RUNGS, [], tmp_path, 0, lambda cell: rest.append(cell["policy"]) or run(cell))
     assert [*ran, *rest] == ["paper"] * 4 + ["servo"] * 4
+
+
+def test_a_folder_with_more_episodes_counts_those_that_are_asked_for(tmp_path: Path) -> None:
+    climb(EvaluationConfig(scenarios=("clear", "opaque"), episodes=4), RUNGS, [], tmp_path, 0, run)
+    fewer = EvaluationConfig(scenarios=("clear",), episodes=2)
+    again = climb(fewer, RUNGS, [], tmp_path, 0, lambda cell: pytest.fail("nothing is left to do"))
+    assert again == climb(fewer, RUNGS, [], tmp_path / "alone", 0, run)
+    assert {(row["scenario"], row["episodes"]) for row in again} == {("clear", 2), ("all", 2)}

@@ -16,7 +16,7 @@ from fixation_gym.experiments.necessity.statistics import AGENT
 from fixation_gym.names import Names
 
 if TYPE_CHECKING:
-    from fixation_gym.evaluation.storage import EpisodeKey
+    from fixation_gym.evaluation.rollout import EpisodeKey
     from fixation_gym.experiments.runner import Cell
     from fixation_policies.blind_ways import BlindWay
 
@@ -118,7 +118,7 @@ class NecessityConfig:
             )
         if read.run["sensor_noise"] != EvaluationConfig.sensor_noise:
             raise UsageError(f"--evaluation must be of nominal sensor noise, but {self.evaluation} is not")
-        return {(result.scenario, result.seed): result.collision_free_success for result in read.results}
+        return {result.key: result.collision_free_success for result in read.results}
 
     def choosing(self) -> dict[Key, Cell]:
         """Episodes on which ways are chosen: all ways on the even seeds, and the oracle.
