@@ -73,7 +73,7 @@ def film_failures(
                 else:
                     different.append(again)
                 progress.update()
-        workers.close_worlds()
+        workers.close_kept()
     return different
 
 

@@ -56,7 +56,7 @@ def evaluate(
             processes=config.workers,
             backend=config.backend,
         )
-        workers.close_worlds()
+        workers.close_kept()
         summary = summary_of(config, [store.finished[key] for key in keys], time.monotonic() - started)
         summary["episodes_resumed"] = resumed
         write_json(out / SUMMARY_FILE, summary)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import atexit
 import importlib.util
 import os
-from collections.abc import Callable, Generator, Iterable, Sequence
-from typing import Any, cast
+from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
+from typing import Any, TypeVar, cast
 
 import gymnasium
 
@@ -19,7 +19,8 @@ BACKENDS = ("loky", "ray")
 Cell = dict[str, Any]
 """One episode to run: env_id, scenario, policy, detector, seed, sensor_noise, image_size. JSON-able and picklable."""
 
-_worlds: dict[tuple[Any, ...], tuple[gymnasium.Env, Policy]] = {}  # at most one: environments are large
+Thing = TypeVar("Thing")
+_kept: dict[tuple[Any, ...], tuple[Any, Callable[[Any], object]]] = {}  # at most one: environments and rigs are large
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
@@ -34,14 +35,32 @@ def world(cell: Cell, render_mode: str | None = None) -> tuple[gymnasium.Env, Po
 
     They stay alive for the next cell of the same scenario: building an environment takes seconds, a reset does not.
     """
-    key = tuple((name, value) for name, value in sorted(cell.items()) if name != "seed")
-    key = tuple((name, tuple(value) if isinstance(value, list) else value) for name, value in key)
-    key = (render_mode, *key)
-    if key not in _worlds:
-        close_worlds()
-        env = make_env(cell, render_mode)
-        _worlds[key] = (env, make_policy(cell["policy"], env, cell.get("detector")))
-    return _worlds[key]
+    items = ((name, value) for name, value in sorted(cell.items()) if name != "seed")
+    settings = tuple((name, tuple(value) if isinstance(value, list) else value) for name, value in items)
+    return kept(_build_world, settings, render_mode, close=lambda world: world[0].close())
+
+
+def _build_world(settings: tuple[tuple[str, Any], ...], render_mode: str | None) -> tuple[gymnasium.Env, Policy]:
+    cell = dict(settings)
+    env = make_env(cell, render_mode)
+    return env, make_policy(cell["policy"], env, cell.get("detector"))
+
+
+def kept(build: Callable[..., Thing], *settings: Hashable, close: Callable[[Thing], object]) -> Thing:
+    """What ``build`` makes of the settings, kept for the next cell of this process; anything else is closed first."""
+    key = (build, *settings)
+    if key not in _kept:
+        close_kept()
+        _kept[key] = build(*settings), close
+    return _kept[key][0]
+
+
+@atexit.register
+def close_kept() -> None:
+    """Close what this process keeps."""
+    while _kept:
+        thing, close = _kept.popitem()[1]
+        close(thing)
 
 
 def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "overlay") -> gymnasium.Env:
@@ -69,14 +88,6 @@ def make_policy(name: str, env: gymnasium.Env, detector: str | None = None) -> P
     from fixation_policies import catalogue
 
     return catalogue.make_policy(name, env, detector)
-
-
-@atexit.register
-def close_worlds() -> None:
-    """Close the environment that ``world`` keeps alive in this process."""
-    while _worlds:
-        _, (env, _) = _worlds.popitem()
-        env.close()
 
 
 def check_backend(backend: str, workers: int) -> None:

@@ -1,15 +1,14 @@
-"""What the experiments share: options of a run, its resumable folder of results, and the rig that a process keeps."""
+"""What the experiments share: options of a run, and its resumable folder of results."""
 
 from __future__ import annotations
 
-import atexit
 import os
 import time
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from fixation_gym.doctor import installed_versions
 from fixation_gym.errors import UsageError, check_names
@@ -24,7 +23,6 @@ Cell = dict[str, Any]
 Result = dict[str, Any]
 """What came of a cell, JSON-able; the cell's key is in it."""
 Key = tuple[Any, ...]
-Rig = TypeVar("Rig")
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class Experiment:
         with store:
             check_no_folders(out, self.outputs)
             yield Folder(self, store, description, run, processes, time.monotonic())
-        close_rig()
+        workers.close_kept()
 
     def _checked(self, value: Any) -> Result:
         """A stored result.
@@ -120,22 +118,3 @@ def check_options(noise: str, seed: int, count: int, count_option: str, processe
     if not 1 <= count <= SEED_BLOCK:
         raise UsageError(f"{count_option} must be within 1..{SEED_BLOCK}, got {count}")
     workers.check_backend("loky", processes)
-
-
-_rigs: dict[tuple[Any, ...], Any] = {}  # at most one: they are large
-
-
-def kept_rig(build: Callable[..., Rig], *settings: Hashable) -> Rig:
-    """What ``build`` makes of the settings, kept for the next cell of this process; another rig is closed first."""
-    key = (build, *settings)
-    if key not in _rigs:
-        close_rig()
-        _rigs[key] = build(*settings)
-    return _rigs[key]
-
-
-@atexit.register
-def close_rig() -> None:
-    """Close the rig that this process keeps."""
-    while _rigs:
-        _rigs.popitem()[1].close()

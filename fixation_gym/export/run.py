@@ -45,7 +45,7 @@ def export(config: ExportConfig, out: Path) -> dict[str, Any]:
             processes=config.workers,
             backend=config.backend,
         )
-        workers.close_worlds()
+        workers.close_kept()
         episodes = [store.finished[key] for key in keys]
         write_dataset(out, episodes, CONTROL_FREQUENCY, config.surroundings.image_size)
         summary = {

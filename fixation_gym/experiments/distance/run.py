@@ -9,11 +9,11 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from fixation_gym.evaluation.files import write_csv
-from fixation_gym.evaluation.workers import prepare_process
+from fixation_gym.evaluation.workers import kept, prepare_process
 from fixation_gym.experiments.distance.config import DistanceConfig
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, INTRINSICS, Condition, Motion
 from fixation_gym.experiments.distance.statistics import summarise
-from fixation_gym.experiments.runner import Cell, Experiment, kept_rig
+from fixation_gym.experiments.runner import Cell, Experiment
 
 SEQUENCES_FILE, CSV_FILE, FIGURE_FILE = "sequences.jsonl", "rows.csv", "distance.png"
 
@@ -50,7 +50,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     motion = get_args(Motion).index(condition.motion)
     lengths = round(condition.distance_m * 1e4), round(condition.amplitude_m * 1e4)
     rng = np.random.default_rng([condition.seed, *lengths, motion])
-    recording = record(kept_rig(PrintRig), condition, noise, rng)
+    recording = record(kept(PrintRig, close=PrintRig.close), condition, noise, rng)
     results = [assess(recording, method, run(recording, method)) for method in methods(recording, noise)]
     errors = [frame.gaze_error_px for frame in recording.frames[recording.measured]]
     value = {

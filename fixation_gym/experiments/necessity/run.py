@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import lru_cache
@@ -19,7 +18,6 @@ from fixation_gym.experiments.necessity.statistics import chosen_ways, summarise
 from fixation_gym.experiments.runner import Cell, Experiment
 
 if TYPE_CHECKING:
-    from fixation_gym.envs.pick_sim import PickSim
     from fixation_gym.envs.scene import SceneSpec
 
 ROWS_FILE, TABLE_FILE, FIGURE_FILE = "rows.csv", "table.csv", "necessity.png"
@@ -41,16 +39,9 @@ EXPERIMENT = Experiment(
 )
 
 
-_sims: list[PickSim] = []  # at most one: it is large
-
-
 def run_cell(cell: Cell) -> dict[str, Any]:
     """Run the episode of a cell; returns scenario, member, seed and how it ended."""
-    if "policy" in cell:
-        close_sims()
-        return _run_with_images(cell)
-    workers.close_worlds()
-    return _run_without_images(cell)
+    return _run_with_images(cell) if "policy" in cell else _run_without_images(cell)
 
 
 def _run_with_images(cell: Cell) -> dict[str, Any]:
@@ -74,9 +65,8 @@ def _run_without_images(cell: Cell) -> dict[str, Any]:
     from fixation_policies.blind_ways import BlindWayPolicy
     from fixation_policies.oracle import OraclePolicy
 
-    if not _sims:
-        _sims.append(PickSim(CONTROL_FREQUENCY))
-    world = World(_sims[0], _scene(cell["scenario"], cell["seed"]))
+    sim = workers.kept(PickSim, CONTROL_FREQUENCY, close=lambda sim: None)
+    world = World(sim, _scene(cell["scenario"], cell["seed"]))
     member = cell["member"]
     policy = OraclePolicy(world) if member == ORACLE else BlindWayPolicy(world, WAYS[member])
     return {**_named(cell), **asdict(play(world, policy))}
@@ -95,12 +85,6 @@ def _scene(scenario: str, seed: int) -> SceneSpec:
     from fixation_gym.envs.sampling import sample_scene
 
     return sample_scene(SCENARIOS[scenario], np_random(seed)[0])
-
-
-@atexit.register
-def close_sims() -> None:
-    """Drop the simulation that ``run_cell`` keeps in this process."""
-    _sims.clear()
 
 
 def measure(config: NecessityConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
@@ -124,8 +108,6 @@ def measure(config: NecessityConfig, out: Path, run: Callable[[Cell], dict[str, 
     with EXPERIMENT.opened(out, {"seed": config.seed}, run, config.workers) as folder:
         choosing = folder.results(config.choosing().values())
         judging = folder.results(config.judging(chosen_ways(choosing, ways)).values())
-        close_sims()
-        workers.close_worlds()
         about = {
             "ways": {name: asdict(way) for name, way in config.ways.items()},
             "quick": config.quick,

@@ -10,8 +10,8 @@ import numpy as np
 
 from fixation_gym.evaluation.config import SEED_BLOCK
 from fixation_gym.evaluation.files import write_csv
-from fixation_gym.evaluation.workers import prepare_process
-from fixation_gym.experiments.runner import Cell, Experiment, kept_rig
+from fixation_gym.evaluation.workers import kept, prepare_process
+from fixation_gym.experiments.runner import Cell, Experiment
 from fixation_gym.experiments.scenarios.config import Key, ScenariosConfig
 from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
 from fixation_gym.experiments.scenarios.statistics import rows_of, summarise
@@ -51,7 +51,7 @@ def rig_for(noise: str) -> ScenarioRig:
     from fixation_gym.envs.config import SENSOR_NOISE
     from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
-    return kept_rig(ScenarioRig, SENSOR_NOISE[noise])
+    return kept(ScenarioRig, SENSOR_NOISE[noise], close=ScenarioRig.close)
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
