@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
+from tyro.conf import Fixed
 
 from fixation_gym.errors import check_names
 from fixation_gym.evaluation.config import EvaluationConfig
@@ -20,23 +21,26 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Ablate:
-    """Evaluate the servo and variants that leave something out on the same episodes, and write their report."""
+class SeveralPolicies(EvaluationConfig):
+    """Episodes that several policies meet: options of evaluation, without what is one policy's own."""
 
-    variant: Names = ()
-    """Names of variants, separated by commas; all by default. The full servo always runs."""
-    scenario: Names = EvaluationConfig.scenarios
-    """Scenario names, separated by commas."""
-    episodes: int = 20
-    """Episodes per scenario and variant."""
+    policy: Fixed[str] = "servo"
+    detector: Fixed[str | None] = None
     seed: int = 0
     """Chooses the block of episode seeds, as in evaluate."""
-    sensor_noise: str = "nominal"
-    """ideal, nominal or conservative."""
+    backend: Fixed[str] = "loky"
+
+
+@dataclass(frozen=True)
+class Ablate(SeveralPolicies):
+    """Evaluate the servo and variants that leave something out on the same episodes, and write their report."""
+
+    episodes: int = 20
+    """Episodes per scenario and variant."""
     image_size: tuple[int, int] = (240, 320)
     """Height and width of the wrist image, px."""
-    workers: int = 1
-    """Number of processes."""
+    variant: Names = ()
+    """Names of variants, separated by commas; all by default. The full servo always runs."""
     film_failures: bool = False
     """Run every failed episode again, and keep six moments of it as a picture for the report."""
     gallery: int = 40
@@ -50,21 +54,13 @@ class Ablate:
 
         names = self.variant or VARIANT_NAMES
         check_names(names, VARIANT_NAMES, "variant")
-        config = EvaluationConfig(
-            scenarios=self.scenario,
-            episodes=self.episodes,
-            seed=self.seed,
-            sensor_noise=self.sensor_noise,
-            image_size=self.image_size,
-            workers=self.workers,
-        )
-        config.check()
+        self.check()
         select_backend()
         from fixation_gym.reporting.ablation import ablate, format_ablations
         from fixation_gym.reporting.report import REPORT_FILE
 
         chosen = tuple(dict.fromkeys((VARIANT_NAMES[0], *names)))
-        _, summary, different = ablate(config, chosen, self.out, self.gallery, self.film_failures)
+        _, summary, different = ablate(self, chosen, self.out, self.gallery, self.film_failures)
         print_different(different)
         print(format_ablations(summary, {variant.name: variant.summary for variant in VARIANTS}))
         print(f"\n{self.out / REPORT_FILE}")
@@ -72,17 +68,15 @@ class Ablate:
 
 
 @dataclass(frozen=True)
-class Ladder:
+class Ladder(SeveralPolicies):
     """From the paper's algorithm to the servo, one step at a time, on the same episodes; what each step buys."""
 
-    scenario: Names = ()
+    scenarios: Annotated[Names, tyro.conf.arg(name="scenario")] = ()
     """Scenario names, separated by commas, of those in which the target is red; all of them by default."""
     episodes: int = 20
     """Episodes per scenario and policy."""
-    seed: int = 0
-    """Chooses the block of episode seeds, as in evaluate."""
-    workers: int = 1
-    """Number of processes."""
+    sensor_noise: Fixed[str] = "nominal"
+    image_size: Fixed[tuple[int, int] | None] = None
     gallery: int = 40
     """Most failures that the report shows."""
     out: Path = Path("out/ladder")
@@ -94,13 +88,8 @@ class Ladder:
         from fixation_policies.ladder import BESIDE, LADDER
 
         red = tuple(name for name, item in SCENARIOS.items() if not item.any_colour)
-        check_names(self.scenario or red, red, "scenario")
-        config = EvaluationConfig(
-            scenarios=self.scenario or red,
-            episodes=self.episodes,
-            seed=self.seed,
-            workers=self.workers,
-        )
+        config = replace(self, scenarios=self.scenarios or red)
+        check_names(config.scenarios, red, "scenario")
         config.check()
         select_backend()
         from fixation_gym.reporting.ladder import FIGURE_FILE, LADDER_FILE, climb, format_ladder

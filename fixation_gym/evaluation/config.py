@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,20 +55,17 @@ class EvaluationConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
+        from fixation_gym.envs.config import SENSOR_NOISE
         from fixation_gym.evaluation.workers import check_backend
         from fixation_policies.catalogue import check_detector, check_policy
 
         check_policy(self.policy)
         check_detector(self.detector, self.policy)
-        check_names(self.scenarios, SCENARIO_NAMES, "scenario")
         check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
-        if len(set(self.scenarios)) < len(self.scenarios):
-            raise UsageError(f"--scenario must name one or more different scenarios, got {','.join(self.scenarios)!r}")
+        check_scenarios(self.scenarios)
         if not 1 <= self.episodes <= SEED_BLOCK:
             raise UsageError(f"--episodes must be within 1..{SEED_BLOCK}, got {self.episodes}")
-        if self.seed < 0:
-            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
+        check_seed(self.seed)
         size = self.surroundings.image_size
         if not all(_IMAGE_SIZES[0] <= length <= _IMAGE_SIZES[1] for length in size):
             raise UsageError(f"--image-size must be within {_IMAGE_SIZES[0]}..{_IMAGE_SIZES[1]}, got {size}")
@@ -120,3 +118,26 @@ class EvaluationConfig:
 def episode_seeds(seed: int, episodes: int) -> list[int]:
     """Seeds of the episodes of one scenario; blocks of different ``seed`` never overlap."""
     return [seed * SEED_BLOCK + index for index in range(episodes)]
+
+
+def check_scenarios(names: Sequence[str]) -> None:
+    """Check names of scenarios.
+
+    Raises:
+        UsageError: if there are none, one is unknown, or one is named twice.
+    """
+    from fixation_gym.envs.config import SCENARIO_NAMES
+
+    check_names(names, SCENARIO_NAMES, "scenario")
+    if len(set(names)) < len(names):
+        raise UsageError(f"--scenario must name one or more different scenarios, got {','.join(names)!r}")
+
+
+def check_seed(seed: int) -> None:
+    """Check the block of seeds.
+
+    Raises:
+        UsageError: if it is negative.
+    """
+    if seed < 0:
+        raise UsageError(f"--seed must be 0 or more, got {seed}")

@@ -1,4 +1,4 @@
-"""What the experiments share: options of a run, and its resumable folder of results."""
+"""What the experiments share: a resumable folder of results, and a summary of how it came about."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fixation_gym.doctor import installed_versions
-from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.config import SEED_BLOCK
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.storage import SUMMARY_FILE, ResultStore, check_no_folders
@@ -102,19 +100,3 @@ class Folder:
         summary = {**statistics, **self.description, **settings, "wall_s": time.monotonic() - self.started}
         write_json(self.store.folder / SUMMARY_FILE, summary)
         return summary
-
-
-def check_options(noise: str, seed: int, count: int, count_option: str, processes: int) -> None:
-    """Check the options that experiments with a rig have in common.
-
-    Raises:
-        UsageError: naming the first bad value and what is allowed.
-    """
-    from fixation_gym.envs.config import SENSOR_NOISE
-
-    check_names([noise], SENSOR_NOISE, "sensor noise")
-    if seed < 0:
-        raise UsageError(f"--seed must be 0 or more, got {seed}")
-    if not 1 <= count <= SEED_BLOCK:
-        raise UsageError(f"{count_option} must be within 1..{SEED_BLOCK}, got {count}")
-    workers.check_backend("loky", processes)

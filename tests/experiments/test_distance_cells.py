@@ -148,7 +148,7 @@ def test_a_killed_run_resumes_without_losing_or_repeating(tmp_path: Path) -> Non
 
 @pytest.mark.usefixtures("_no_figure")
 def test_another_run_in_the_folder_is_refused(tmp_path: Path) -> None:
-    measure(DistanceConfig(quick=True, seeds=1), tmp_path, fake_run)
+    measure(DistanceConfig(quick=True, count=1), tmp_path, fake_run)
     with pytest.raises(UsageError, match="noise conservative instead of nominal"):
         measure(DistanceConfig(quick=True, noise="nominal"), tmp_path, fake_run)
 
@@ -189,7 +189,7 @@ def test_nees_bounds_are_those_of_chi_square() -> None:
 
 
 def test_ratios_compare_the_motions_on_the_prints_that_both_have_seen() -> None:
-    cells = [fake_run(cell) for cell in DistanceConfig(seeds=6).cells() if cell["distance_m"] == 0.066]
+    cells = [fake_run(cell) for cell in DistanceConfig(count=6).cells() if cell["distance_m"] == 0.066]
     widths = {
         motion: {c["print_width_m"] for c in cells if c["motion"] == motion} for motion in ("fixation", "translation")
     }

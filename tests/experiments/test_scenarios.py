@@ -170,7 +170,7 @@ def fake_run(cell):
 
 
 def test_a_run_gives_rows_votes_and_alarms_and_resumes(tmp_path):
-    config = ScenariosConfig(instances=2, film=False)
+    config = ScenariosConfig(count=2, film=False)
     summary = measure(config, tmp_path, fake_run)
     for scene in SCENES:
         rows = {(row["variant"], row["rule"]): row for row in summary["scenes"][scene]}
@@ -214,11 +214,11 @@ def test_a_run_gives_rows_votes_and_alarms_and_resumes(tmp_path):
 
 
 def test_instances_differ_by_seed_scene_and_variant():
-    cells = ScenariosConfig(instances=3).cells()
+    cells = ScenariosConfig(count=3).cells()
     assert len(cells) == 3 * (len(SCENES) * len(VARIANTS) + 1)
     assert len({instance_rng(cell).random() for cell in cells.values()}) == len(cells)
-    assert ScenariosConfig(quick=True).instance_count == 3
-    assert ScenariosConfig().instance_count == 20
+    assert ScenariosConfig(quick=True).repetitions == 3
+    assert ScenariosConfig().repetitions == 20
 
 
 @pytest.mark.parametrize(

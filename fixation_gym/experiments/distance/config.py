@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
+
+import tyro
 
 from fixation_gym.evaluation.config import SEED_BLOCK
 from fixation_gym.experiments.distance.sequence import INTRINSICS, Motion
+from fixation_gym.experiments.rig_config import RigConfig
 
 if TYPE_CHECKING:
     from fixation_gym.experiments.runner import Cell
@@ -21,39 +24,24 @@ LARGE_AMPLITUDE_FROM = 0.15
 
 
 @dataclass(frozen=True)
-class DistanceConfig:
+class DistanceConfig(RigConfig):
     """What to measure, and with how many processes."""
+
+    COUNT_OPTION = "--seeds"
+    COUNTS = (20, 2)
 
     quick: bool = False
     """Six distances and two seeds instead of thirteen and twenty, and one amplitude per distance, the largest."""
-    seeds: int | None = None
+    count: Annotated[int | None, tyro.conf.arg(name="seeds")] = None
     """Sequences per distance, amplitude and motion; 20 by default, 2 with --quick."""
     seed: int = 0
     """Chooses the block of seeds: sequence i has seed 100000 * SEED + i."""
     noise: str = "conservative"
-    """Sensor noise: ideal, nominal or conservative."""
-    workers: int = 1
-    """Number of processes."""
-
-    def check(self) -> None:
-        """Check everything that can be checked without the simulator.
-
-        Raises:
-            UsageError: naming the first bad value and what is allowed.
-        """
-        from fixation_gym.experiments.runner import check_options
-
-        check_options(self.noise, self.seed, self.seed_count, "--seeds", self.workers)
-
-    @property
-    def seed_count(self) -> int:
-        """Sequences per distance, amplitude and motion."""
-        return self.seeds if self.seeds is not None else 2 if self.quick else 20
 
     def cells(self) -> list[Cell]:
         """All sequences. A seed's conditions come before those of the next, so that part of a run shows the whole."""
         cells = []
-        for index in range(self.seed_count):
+        for index in range(self.repetitions):
             for distance in QUICK_DISTANCES if self.quick else DISTANCES:
                 amplitudes = [a for a in AMPLITUDES if a == AMPLITUDES[0] or distance >= LARGE_AMPLITUDE_FROM]
                 for amplitude in amplitudes[-1:] if self.quick else amplitudes:

@@ -91,7 +91,7 @@ def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, A
     settings = {"seed": config.seed, "noise": config.noise}
     with EXPERIMENT.opened(out, settings, run, config.workers) as folder:
         statistics = summarise(folder.results(config.cells()), config.noise)
-        about = {"quick": config.quick, "seeds": config.seed_count, "sequences_resumed": folder.resumed}
+        about = {"quick": config.quick, "seeds": config.repetitions, "sequences_resumed": folder.resumed}
         summary = folder.write_summary(statistics, about)
         write_csv(out / CSV_FILE, summary["rows"])
         draw_figure(out / FIGURE_FILE, summary["rows"])

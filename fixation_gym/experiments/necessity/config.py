@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from fixation_gym.errors import UsageError, check_names
-from fixation_gym.evaluation.config import SEED_BLOCK, EvaluationConfig, episode_seeds
+from fixation_gym.evaluation.config import SEED_BLOCK, EvaluationConfig, check_scenarios, check_seed, episode_seeds
 from fixation_gym.experiments.necessity.statistics import AGENT
 from fixation_gym.names import Names
 
@@ -55,18 +55,13 @@ class NecessityConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SCENARIO_NAMES
         from fixation_gym.evaluation.workers import check_backend
         from fixation_policies.catalogue import AGENT_SUFFIX, POLICY_NAMES, check_policy
 
-        names = self.scenario_names
-        check_names(names, SCENARIO_NAMES, "scenario")
-        if len(set(names)) < len(names):
-            raise UsageError(f"--scenario must name one or more different scenarios, got {','.join(names)!r}")
+        check_scenarios(self.scenario_names)
         if not 2 <= self.episode_count <= SEED_BLOCK or self.episode_count % 2:
             raise UsageError(f"--episodes must be an even number within 2..{SEED_BLOCK}, got {self.episodes}")
-        if self.seed < 0:
-            raise UsageError(f"--seed must be 0 or more, got {self.seed}")
+        check_seed(self.seed)
         if self.beside:
             check_names(self.beside, [name for name in POLICY_NAMES if name != ORACLE], "policy")
         if self.agent is not None:

@@ -82,7 +82,7 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
     cells, settings = config.cells(), {"seed": config.seed, "noise": config.noise}
     with EXPERIMENT.opened(out, settings, run, config.workers) as folder:
         statistics = summarise(folder.results(cells.values()))
-        about = {"quick": config.quick, "instances": config.instance_count, "runs_resumed": folder.resumed}
+        about = {"quick": config.quick, "instances": config.repetitions, "runs_resumed": folder.resumed}
         summary = folder.write_summary(statistics, about)
         write_csv(out / CSV_FILE, rows_of(summary["scenes"]))
         if config.film:
