@@ -14,15 +14,13 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.perception.detection.tracking import Expectation, TrackingSettings
+from fixation_gym.perception.detection.tracking import Expectation
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 
 _BINS = (8, 32, 32)
 """Bins of L, a and b: a target is told by its hue more than by its brightness, which light changes."""
 _SMOOTHING = (1.2, 1.0, 1.0)
 """Standard deviation over which a colour counts for its neighbours, bins."""
-_STILL, _OWN_SIZE = TrackingSettings().slack, TrackingSettings().size_share
-"""Parts of the reach that are there while the target is in sight."""
 _LEAST = 1e-4
 """Share of an unseen colour."""
 
@@ -125,8 +123,7 @@ class BoxTracker:
         side = max(1, round(self._settings.blur_px * self._intrinsics.width / 320)) | 1
         scores = cv2.blur(scores, (side, side))
         if math.isfinite(expected.reach):
-            moved = max(0.0, expected.reach - _STILL - _OWN_SIZE * expected.size)
-            extent = self._settings.extent * size + moved
+            extent = self._settings.extent * size + expected.moved
             away = self._off_middle(window, expected) / extent**2
             scores = scores + np.float32(self._settings.prior) * np.minimum(1.0 - away, 0.0).astype(np.float32)
         return (scores > 0.0).view(np.uint8)

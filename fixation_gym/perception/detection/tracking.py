@@ -55,6 +55,8 @@ class Expectation:
     """Largest offset from there, normalised coordinates; inf: it may be anywhere."""
     size: float = 0.0
     """Standard deviation of its pixels about the centroid, normalised coordinates; 0 if not known."""
+    moved: float = 0.0
+    """Part of ``reach``: how far it may have moved by itself while it was not seen."""
 
 
 FIRST_LOOK = Expectation(np.zeros(2), math.inf)
@@ -95,5 +97,6 @@ def expected_at(track: Track | None, T_base_cam: FloatArray, time: float, settin
         return FIRST_LOOK
     if z <= 0.0:
         return NOWHERE
-    moved = settings.size_share * track.size_m + min(settings.speed * unseen, settings.largest_move_m)
-    return Expectation(np.array([x / z, y / z]), settings.slack + moved / z, track.size_m / z)
+    moved = min(settings.speed * unseen, settings.largest_move_m)
+    reach = settings.slack + (settings.size_share * track.size_m + moved) / z
+    return Expectation(np.array([x / z, y / z]), reach, track.size_m / z, moved / z)

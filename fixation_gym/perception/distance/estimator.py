@@ -111,7 +111,9 @@ class PoseEstimator:
         self._own_depths.append(target_inverse_depth(flow, twist, target))
         recent = [own for own in self._own_depths if own is not None]
         covered = last.time - self._covered_time < _COVERED_S
-        own = contradiction(inverse_distance(self, middle.T_base_cam), recent, covered)
+        assert self._state is not None, "the target was seen"
+        depth, std, _ = pose_filter.distance_at(self._state, middle.T_base_cam, self._settings)
+        own = contradiction((1.0 / depth, std / depth**2), recent, covered)
         if own is not None:
             self._state = mended(own, middle, last, self._settings)
             self._own_depths.clear()
