@@ -16,19 +16,17 @@ from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.state import Resumable
 from fixation_gym.envs.target_box import target_box
+from fixation_gym.envs.views import Views, overlay
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
-from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.percept import Percept
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
-    from fixation_gym.envs.rendering import View, Window
 
 RENDER_VIEWS = ("wrist", "front", "overlay")
-_FRONT_SIZE = (360, 480)
 _EPISODE = ("scene", "percept", "camera_on", "_np_random", "_np_random_seed", "_noise_rng", "_errors")
 _EPISODE += ("_steps", "_steps_lifted", "_collided", "_target_box", "_state", "_arm", "_observation", "_last_rgb")
 """What changes in an episode beside the simulation."""
@@ -131,8 +129,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self._limits = {key: (box.low, box.high) for key, box in boxes}
         self._running = False
         self._sim: PickSim | None = None
-        self._views: dict[str, View] = {}
-        self._window: Window | None = None
+        self._views = Views((self.intrinsics.height, self.intrinsics.width))
         self.percept: Percept | None = None
         """What whoever acts perceived in the last observation, if it says so: drawn into the overlay."""
         self.scene: SceneSpec | None = None
@@ -153,8 +150,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self._errors = sensors.draw_episode_errors(self.noise, self._noise_rng)
         self.sim.reset(self.scene)
         self._running = True
-        self._steps = 0
-        self._steps_lifted = 0
+        self._steps = self._steps_lifted = 0
         self._collided = False
         self.percept = None
         self.camera_on = True
@@ -194,30 +190,17 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             gym.logger.warn('render() needs render_mode="rgb_array" or "human" in gym.make')
             return None
         self._require_reset()
-        qpos = self.sim.data.qpos
         if self.render_mode == "human":
-            if self._window is None:
-                from fixation_gym.envs.rendering import Window
-
-                self._window = Window(self.sim.display_model)
-            self._window.show(qpos)
+            self._views.show(self.sim)
             return None
-        if self.render_view != "overlay":
-            return self._image(self.render_view, qpos)
-        scale = _FRONT_SIZE[0] / self.intrinsics.height
-        wrist = draw_overlay(self._last_rgb, self.percept, scale=scale)
-        return np.ascontiguousarray(np.hstack([wrist, self._image("front", qpos)]))
+        shows_overlay = self.render_view == "overlay"
+        shown = self._image("front" if shows_overlay else self.render_view, self.sim.data.qpos)
+        return overlay(self._last_rgb, self.percept, shown) if shows_overlay else shown
 
     def close(self) -> None:
         """Free GL contexts, windows and the simulation; may be called twice. A reset builds them again."""
-        for view in self._views.values():
-            view.close()
-        self._views = {}
-        if self._window is not None:
-            self._window.close()
-            self._window = None
-        self._sim = None
-        self._running = False
+        self._views.close()
+        self._sim, self._running = None, False
 
     def _state_arguments(self) -> dict[str, Any]:
         render = {"render_mode": self.render_mode, "render_view": self.render_view}
@@ -259,11 +242,6 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         return self.sim.data
 
     @property
-    def wrist_view(self) -> View:
-        """The view that makes the observation's image."""
-        return self._view("observation")
-
-    @property
     def sensed(self) -> dict[str, Any]:
         """The last observation, whatever a wrapper makes of it."""
         return self._observation
@@ -279,16 +257,13 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         if self._image_size is not None:
             observation["rgb"] = self._last_rgb.copy()
             observation["target_box"] = self._target_box.astype(np.float32)
-        joint_pos, joint_vel = sensors.measure_joints(state.joint_pos, state.joint_vel, self.noise, self._noise_rng)
-        pose = sensors.measure_camera_pose(
-            state.camera_pose, state.jacobian, joint_pos - state.joint_pos, self._errors.hand_eye
-        )
+        joint_pos, joint_vel, pose, twist = sensors.measure_arm(state, self.noise, self._errors, self._noise_rng)
         vectors: dict[str, Any] = {
             "joint_pos": joint_pos,
             "joint_vel": joint_vel,
             "gripper_width": [state.gripper_width],
             "camera_pose": matrix_to_pose(pose),
-            "camera_twist": sensors.measure_camera_twist(state.jacobian, joint_vel, self._errors),
+            "camera_twist": twist,
             "time": [self._steps / self.control_frequency],
         }
         for key, value in vectors.items():
@@ -300,19 +275,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     def _image(self, view: str, qpos: FloatArray) -> ImageArray:
         """Render one of the views "observation", "wrist" and "front"."""
         mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
-        return self._view(view).render(qpos, with_reflections=mirror)
-
-    def _view(self, view: str) -> View:
-        """One of the views, opened at first use."""
-        if view not in self._views:
-            from fixation_gym.envs.rendering import View
-
-            size = _FRONT_SIZE if view == "front" else (self.intrinsics.height, self.intrinsics.width)
-            camera = "front" if view == "front" else "wrist"
-            for_people = view != "observation"
-            model = self.sim.display_model if for_people else self.sim.model
-            self._views[view] = View(model, camera, *size, full_quality=for_people)
-        return self._views[view]
+        return self._views.view(view, self.sim).render(qpos, with_reflections=mirror)
 
     def _task_state(self) -> rewards.TaskState:
         distance = math.dist(self.sim.body_position("target"), self.sim.tool_position())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
@@ -14,6 +15,9 @@ from fixation_gym.envs.config import SensorNoise
 from fixation_gym.geometry.rigid import inverse
 from fixation_gym.geometry.twist import adjoint
 from fixation_gym.types import FloatArray, ImageArray
+
+if TYPE_CHECKING:
+    from fixation_gym.envs.pick_sim import ArmState
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,15 @@ def measure_camera_pose(
 def measure_camera_twist(jacobian: FloatArray, joint_vel: FloatArray, errors: EpisodeErrors) -> FloatArray:
     """Twist [v, w], shape (6,), that kinematics gives in the camera frame as the hand-eye calibration believes it."""
     return errors.believed_from_true @ (jacobian @ joint_vel)
+
+
+def measure_arm(
+    arm: ArmState, noise: SensorNoise, errors: EpisodeErrors, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Joint angles and rates, rad and rad/s, and the camera's pose (4, 4) and twist (6,) that follow from them."""
+    joint_pos, joint_vel = measure_joints(arm.joint_pos, arm.joint_vel, noise, rng)
+    pose = measure_camera_pose(arm.camera_pose, arm.jacobian, joint_pos - arm.joint_pos, errors.hand_eye)
+    return joint_pos, joint_vel, pose, measure_camera_twist(arm.jacobian, joint_vel, errors)
 
 
 def _small_rotation(vector: FloatArray) -> FloatArray:

@@ -135,9 +135,7 @@ class ScenarioRig:
     ) -> Observation:
         noise, arm = self._noise, self.sim.arm_state()
         image = sensors.measure_image(self._image(exposed), noise, errors.exposure, rng)
-        joint_pos, joint_vel = sensors.measure_joints(arm.joint_pos, arm.joint_vel, noise, rng)
-        pose = sensors.measure_camera_pose(arm.camera_pose, arm.jacobian, joint_pos - arm.joint_pos, errors.hand_eye)
-        twist = sensors.measure_camera_twist(arm.jacobian, joint_vel, errors)
+        joint_pos, joint_vel, pose, twist = sensors.measure_arm(arm, noise, errors, rng)
         return Observation(time, image, joint_pos, joint_vel, matrix_to_pose(pose), twist, arm.gripper_width)
 
     def _target_depth(self) -> float:
