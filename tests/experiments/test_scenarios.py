@@ -226,7 +226,7 @@ def test_instances_differ_by_seed_scene_and_variant():
     [
         ({"noise": "loud"}, "nominal"),
         ({"seed": -1}, "--seed must be 0 or more"),
-        ({"instances": 0}, "--instances must be within"),
+        ({"count": 0}, "--instances must be within"),
         ({"workers": 0}, "--workers must be at least 1"),
     ],
 )
