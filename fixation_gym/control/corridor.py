@@ -5,14 +5,13 @@ Used by the servo on what it has seen, by the scene sampler, so that every scene
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from fixation_gym.geometry.boxes import Box, BoxSet, box_set, joined
+from fixation_gym.control.box_tests import Aligned, aligned, any_meets
+from fixation_gym.geometry.boxes import Box, BoxSet, box_set
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
@@ -72,7 +71,7 @@ def free_directions(
         Mask of shape (n,).
     """
     boxes = obstacles if isinstance(obstacles, BoxSet) else box_set(obstacles)
-    return np.asarray(~any_meets(target, hand_axes(directions, rolls), *boxes, *swept_hand(margin)))
+    return np.asarray(~any_meets(target, hand_axes(directions, rolls), boxes, swept_hand(margin)))
 
 
 def barred_directions(target: FloatArray, obstacles: BoxSet, directions: FloatArray, depth: float) -> MaskArray:
@@ -89,7 +88,7 @@ def barred_directions(target: FloatArray, obstacles: BoxSet, directions: FloatAr
     Returns:
         Mask of shape (n,).
     """
-    return any_meets(target, hand_axes(directions), *obstacles, *swept_hand(-depth, wrist=False))
+    return any_meets(target, hand_axes(directions), obstacles, swept_hand(-depth, wrist=False))
 
 
 def hand_axes(directions: FloatArray, rolls: FloatArray | None = None) -> FloatArray:
@@ -116,16 +115,16 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
         Mask of shape (...).
     """
     flat = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-    return np.asarray(_any_holds(flat, *swept_hand(margin)).reshape(points.shape[:-1]))
+    return np.asarray(_any_holds(flat, *swept_hand(margin)[:2]).reshape(points.shape[:-1]))
 
 
-def swept_hand(margin: float, wrist: bool = True) -> tuple[FloatArray, FloatArray]:
-    """Centres and half sizes of the boxes swept on a straight way, widened by a margin; each of shape (n, 3), m.
+def swept_hand(margin: float, wrist: bool = True) -> Aligned:
+    """Boxes swept on a straight way, widened by a margin, m.
 
     Without the wrist they are of what the hand is sure to fill; the wrist's box holds it however the arm turns it.
     """
     boxes = _BOXES if wrist else _SOLID_BOXES
-    return 0.5 * (boxes[:, 0] + boxes[:, 1]), 0.5 * (boxes[:, 1] - boxes[:, 0]) + margin
+    return aligned(0.5 * (boxes[:, 0] + boxes[:, 1]), 0.5 * (boxes[:, 1] - boxes[:, 0]) + margin)
 
 
 def level_axes(directions: FloatArray) -> FloatArray:
@@ -153,161 +152,8 @@ def _any_holds(points: FloatArray, centres: FloatArray, halves: FloatArray) -> M
     return inside
 
 
-@njit(cache=True)
-def _length(vector: FloatArray) -> float:
-    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-
-
-@njit(cache=True)
-def _turn(axes: FloatArray, place: FloatArray, origin: FloatArray, out: FloatArray) -> None:
-    """A place in the frame at ``origin`` whose axes are the rows of ``axes``."""
-    for k in range(3):
-        out[k] = 0.0
-        for axis in range(3):
-            out[k] += axes[k, axis] * (place[axis] - origin[axis])
-
-
-@njit(cache=True)
-def _multiply(first: FloatArray, second: FloatArray, out: FloatArray) -> None:
-    for k in range(3):
-        for axis in range(3):
-            out[k, axis] = 0.0
-            for m in range(3):
-                out[k, axis] += first[k, m] * second[m, axis]
-
-
-@njit(cache=True)
-def _is_outside(place: FloatArray, low: FloatArray, high: FloatArray, margin: float) -> bool:
-    outside = False
-    for k in range(3):
-        outside |= place[k] < low[k] - margin or place[k] > high[k] + margin
-    return outside
-
-
-@njit(cache=True)
-def any_meets(
-    target: FloatArray,
-    axes: FloatArray,
-    places: FloatArray,
-    turns: FloatArray,
-    turned_halves: FloatArray,
-    centres: FloatArray,
-    halves: FloatArray,
-) -> MaskArray:
-    """For each of n cameras, axes (n, 3, 3), whether one of m turned boxes meets one of the aligned ones."""
-    hit = np.zeros(len(axes), np.bool_)
-    low, high = centres[0] - halves[0], centres[0] + halves[0]
-    for box in range(1, len(centres)):
-        low, high = np.minimum(low, centres[box] - halves[box]), np.maximum(high, centres[box] + halves[box])
-    offset, rotation = np.empty(3), np.empty((3, 3))
-    for camera in range(len(axes)):
-        for i in range(len(places)):
-            radius = _length(turned_halves[i])
-            _turn(axes[camera], places[i], target, offset)
-            if _is_outside(offset, low, high, radius):  # of the box around all aligned ones, as most are
-                continue
-            _multiply(axes[camera], turns[i], rotation)
-            for box in range(len(centres)):
-                if _boxes_meet(offset, centres[box], rotation, turned_halves[i], halves[box]):
-                    hit[camera] = True
-                    break
-            if hit[camera]:
-                break
-    return hit
-
-
-@njit(cache=True)
-def _boxes_meet(
-    offset: FloatArray, centre: FloatArray, rotation: FloatArray, turned: FloatArray, half: FloatArray
-) -> bool:
-    """Whether a box turned by ``rotation`` at ``offset`` meets an aligned one (separating axes, Gottschalk).
-
-    Without temporary arrays, since sampling a scene asks for it a million times.
-    """
-    d = (offset[0] - centre[0], offset[1] - centre[1], offset[2] - centre[2])
-    for i in range(3):
-        reach = half[i]
-        for k in range(3):
-            reach += abs(rotation[i, k]) * turned[k]
-        if abs(d[i]) > reach:
-            return False
-    for i in range(3):
-        along, reach = 0.0, turned[i]
-        for k in range(3):
-            along += d[k] * rotation[k, i]
-            reach += abs(rotation[k, i]) * half[k]
-        if abs(along) > reach:
-            return False
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        for j in range(3):
-            k, m = (j + 1) % 3, (j + 2) % 3
-            reach = half[a] * abs(rotation[b, j]) + half[b] * abs(rotation[a, j])
-            reach += turned[k] * abs(rotation[i, m]) + turned[m] * abs(rotation[i, k])
-            # Parallel edges have no cross product: their axis is none, which the small number says.
-            if abs(d[b] * rotation[a, j] - d[a] * rotation[b, j]) > reach + 1e-9:
-                return False
-    return True
-
-
-def boxes_meet(first: BoxSet, second: BoxSet, gap: float) -> bool:
-    """Whether a box of one set comes nearer than about ``gap`` m to one of the other."""
-    return bool(any_pair_meets(first.centres, first.rotations, first.halves + gap, *second))
-
-
-def meeting_pairs(sets: Sequence[BoxSet], gap: float) -> MaskArray:
-    """For n sets of boxes, which of them come nearer than about ``gap`` m to each other, shape (n, n)."""
-    owners = np.repeat(np.arange(len(sets)), [len(boxes.centres) for boxes in sets])
-    return np.asarray(_meeting_pairs(*joined(sets), owners, len(sets), gap))
-
-
-@njit(cache=True)
-def _meeting_pairs(
-    places: FloatArray, turns: FloatArray, halves: FloatArray, owners: NDArray[np.int64], count: int, gap: float
-) -> MaskArray:
-    """The compiled part of ``meeting_pairs``; ``owners`` are the sets of the boxes, shape (m,)."""
-    meets = np.zeros((count, count), np.bool_)
-    reach, origin = np.sqrt(np.sum(halves**2, axis=1)) + gap, np.zeros(3)
-    offset, rotation = np.empty(3), np.empty((3, 3))
-    for i in range(len(places)):
-        for j in range(i):
-            first, second = owners[i], owners[j]
-            if first == second or meets[first, second]:
-                continue
-            _turn(turns[i].T, places[j], places[i], offset)
-            if _length(offset) > reach[i] + reach[j]:
-                continue
-            _multiply(turns[i].T, turns[j], rotation)
-            if _boxes_meet(offset, origin, rotation, halves[j], halves[i] + gap):
-                meets[first, second] = meets[second, first] = True
-    return meets
-
-
 def hand_boxes(T_base_cam: FloatArray) -> BoxSet:
     """Boxes around the parts of the hand of a camera at a pose, shape (4, 4)."""
     rotation = T_base_cam[:3, :3]
     tool = T_base_cam[:3, 3] + rotation @ ROBOT.tool_in_camera
     return BoxSet(tool + _MIDDLES @ rotation.T, np.repeat(rotation[None], len(_MIDDLES), axis=0), _HALVES)
-
-
-@njit(cache=True)
-def any_pair_meets(
-    places: FloatArray,
-    turns: FloatArray,
-    halves: FloatArray,
-    others: FloatArray,
-    other_turns: FloatArray,
-    other_halves: FloatArray,
-) -> bool:
-    """Whether one of n turned boxes, (n, 3), (n, 3, 3), (n, 3), meets one of m others."""
-    origin, offset, rotation = np.zeros(3), np.empty(3), np.empty((3, 3))
-    for i in range(len(places)):
-        reach = _length(halves[i])
-        for j in range(len(others)):
-            _turn(turns[i].T, others[j], places[i], offset)
-            if _length(offset) > reach + _length(other_halves[j]):
-                continue
-            _multiply(turns[i].T, other_turns[j], rotation)
-            if _boxes_meet(offset, origin, rotation, other_halves[j], halves[i]):
-                return True
-    return False

@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from fixation_gym.envs.object_pool import MAX_OBSTACLES, TARGET_SHAPES
-from fixation_gym.envs.obstacle_kinds import KIND_NAMES, MATERIALS
+from fixation_gym.envs.obstacle_kinds import KIND_NAMES
+from fixation_gym.envs.shapes import MATERIALS
 from fixation_gym.robots import ROBOT
 
 CONTROL_FREQUENCY = 25
@@ -35,7 +36,7 @@ class Scenario:
 
     name: str = "custom"
     obstacle_materials: tuple[str, ...] = ()
-    """Materials to draw from, ``obstacle_kinds.MATERIALS``; the first obstacle is of the first one."""
+    """Materials to draw from, ``shapes.MATERIALS``; the first obstacle is of the first one."""
     obstacle_kinds: tuple[str, ...] = KIND_NAMES
     """Kinds to draw from, ``obstacle_kinds.KIND_NAMES``."""
     first_kinds: tuple[str, ...] = ()

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fixation_gym.control.corridor import hand_axes
+from fixation_gym.control.corridor import hand_axes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.object_pool import target_shape
-from fixation_gym.envs.placement import Room, sample_push
+from fixation_gym.envs.placement import sample_push
+from fixation_gym.envs.room import FREE_ROOM, Room
 from fixation_gym.envs.scene import TargetSpec
 from fixation_gym.geometry.boxes import box_set
 from fixation_gym.robots import ROBOT
@@ -131,7 +132,8 @@ def _room(target: TargetSpec, free: Way) -> Room:
     rolls = np.array([0.0] * (1 + len(rim)) + turns)
     ends = target.places[[0, -1]] if target.motion else target.places[:1]
     reds = box_set([replace(target.box, centre=place) for place in target.places])
-    return Room(reds, ends, hand_axes(ways, rolls))
+    place = ROBOT.workspace
+    return Room(place.table_height, np.array(place.table), reds, ends, hand_axes(ways, rolls), swept_hand(FREE_ROOM))
 
 
 def _grasp_turns(target: TargetSpec, free: Way) -> list[float]:

@@ -18,11 +18,11 @@ import numpy as np
 
 from fixation_gym.control.corridor import free_directions
 from fixation_gym.control.reach import sample_direction
-from fixation_gym.envs.barriers import Pool, View, add_movers, bar_ways, draw_across, draw_candidates
+from fixation_gym.envs.barriers import View, add_movers, bar_ways, draw_pool, with_some_across
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.goal import Goal, Way, sample_goal, sample_target
-from fixation_gym.envs.placement import FREE_ROOM
 from fixation_gym.envs.pool_slots import fits_pool
+from fixation_gym.envs.room import FREE_ROOM
 from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, Vector
@@ -89,18 +89,16 @@ def _with_events_drawn(scenario: Scenario, rng: np.random.Generator) -> Scenario
 def _propose(scenario: Scenario, free: tuple[float, float], rng: np.random.Generator) -> SceneSpec | None:
     goal = sample_goal(scenario, free, rng)
     crowded = scenario.obstacle_count[1] + scenario.moving_count[1] > 0
-    candidates = draw_candidates(scenario, goal, rng) if crowded else []
-    pool = Pool.of(candidates) if candidates else None
+    pool = draw_pool(scenario, goal, rng) if crowded else None
     views = (_sample_view(scenario, goal, rng) for _ in range(_VIEW_DRAWS))
     if not crowded:
         view = next((view for view in views if view), None)
         return None if view is None else _scene(scenario, goal, view, (), rng)
-    if pool is None or not pool.can_bar(goal):
+    if pool is None:
         return None
     for view in islice((view for view in views if view and view.is_apart(goal)), _VIEWS):
-        if scenario.through_sight:
-            pool = Pool.of([*draw_across(scenario, goal, view, rng), *candidates])
-        barriers = bar_ways(scenario, goal, view, pool, rng)
+        within = with_some_across(scenario, goal, view, pool, rng) if scenario.through_sight else pool
+        barriers = bar_ways(scenario, goal, view, within, rng)
         placed = None if barriers is None else add_movers(scenario, goal, view, barriers, rng)
         if placed is not None and fits_pool(placed):
             return _scene(scenario, goal, view, tuple(placed), rng)

@@ -50,7 +50,7 @@ class ObstacleSpec:
     """One obstacle, centre in base at reset in m; ``texture`` dresses solid parts, ``rgba`` the see-through ones."""
 
     kind: str
-    """What it is made of, one of ``obstacle_kinds.MATERIALS``."""
+    """What it is made of, one of ``shapes.MATERIALS``."""
     shape: Shape
     position: Vector
     yaw: float

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from fixation_gym.types import FloatArray, Vector
 
 Primitive = Literal["box", "cylinder", "sphere", "ellipsoid"]
 Finish = Literal["solid", "glass", "rim", "label", "mirror"]
+PRIMITIVES: tuple[Primitive, ...] = get_args(Primitive)
+FINISHES: tuple[Finish, ...] = get_args(Finish)
+MATERIALS = ("opaque", "translucent", "mirror", "wire")
+"""What obstacles are made of: wood, bricks or metal; glass with rims; one framed mirror; bars."""
 
 
 @dataclass(frozen=True)
@@ -120,37 +124,3 @@ def cage(half_x: float, half_y: float, half_z: float, bar: float) -> tuple[Part,
     along_y = tuple(Part("box", (bar, half_y, bar), (a * x, 0.0, b * z), finish="rim") for a, b in signs)
     along_z = tuple(Part("box", (bar, bar, half_z), (a * x, b * y, 0.0), finish="rim") for a, b in signs)
     return along_x + along_y + along_z
-
-
-_RIM = 0.005
-"""Half width of the rims of panes, m."""
-
-
-def pane(material: str, half_width: float, half_height: float, centre: Vector, pitch: float = 0.0) -> tuple[Part, ...]:
-    """A flat board of some material that faces +x, leaning by ``pitch`` about y; a mirror reflects on that side.
-
-    Args:
-        material: "opaque" (a board), "translucent" (glass with a rim), "mirror" (with a rim) or "wire" (a mesh).
-        half_width: along y, m.
-        half_height: along the board's own z, m.
-        centre: of the board, m.
-        pitch: rad; -pi/2 makes a horizontal board that faces up.
-    """
-    if material == "opaque":
-        return (Part("box", (0.006, half_width, half_height), centre, pitch=pitch),)
-    up = np.array([math.sin(pitch), 0.0, math.cos(pitch)])
-    sides = [np.array(centre) + sign * (half_width - _RIM) * np.array([0.0, 1.0, 0.0]) for sign in (-1.0, 1.0)]
-    ends = [np.array(centre) + sign * (half_height - _RIM) * up for sign in (-1.0, 1.0)]
-    thick = 0.006 if material != "wire" else 0.003
-    rim = [Part("box", (thick, _RIM, half_height), _vector(at), pitch=pitch, finish="rim") for at in sides]
-    rim += [Part("box", (thick, half_width, _RIM), _vector(at), pitch=pitch, finish="rim") for at in ends]
-    inner_width, inner_height = half_width - 2 * _RIM, half_height - 2 * _RIM
-    if material == "mirror":
-        # MuJoCo draws the reflection on a box's local +z face; a quarter turn takes it to the board's +x.
-        size = (inner_height, inner_width, 0.004)
-        return (Part("box", size, centre, pitch=pitch + math.pi / 2, finish="mirror"), *rim)
-    if material == "translucent":
-        return (Part("box", (0.003, inner_width, inner_height), centre, pitch=pitch, finish="glass"), *rim)
-    upright = Part("box", (0.002, 0.002, half_height), centre, pitch=pitch, finish="rim")
-    across = Part("box", (0.002, half_width, 0.002), centre, pitch=pitch, finish="rim")
-    return (*rim, upright, across)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 
+from fixation_gym.envs.drafts import Drafts
 from fixation_gym.envs.object_pool import target_shape
+from fixation_gym.envs.part_rows import PITCH, YAW
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
-from fixation_gym.geometry.boxes import Box
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
@@ -41,9 +43,41 @@ def is_seen(obstacle: ObstacleSpec, T_base_cam: FloatArray, others: list[Obstacl
     return bool(seen.mean() > 0.15)
 
 
-def passes_through(box: Box, camera: FloatArray, point: FloatArray) -> bool:
-    """Whether the line from camera to point passes through the inner part of a box."""
-    return bool(_crossed(camera, point[None], box.centre, box.rotation, 0.85 * box.half_extent)[0])
+@njit(cache=True)
+def pass_through(drafts: Drafts, camera: FloatArray, point: FloatArray) -> MaskArray:
+    """Which drafts have the line from camera to point pass through the inner part of the box around them."""
+    through = np.zeros(len(drafts.kinds), np.bool_)
+    for index in range(len(through)):
+        middle, half = _box_around(drafts.rows[drafts.ends[index] : drafts.ends[index + 1]])
+        c, s = math.cos(drafts.facings[index]), math.sin(drafts.facings[index])
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        centre = drafts.origins[index].copy()
+        centre[0] += c * middle[0] - s * middle[1]
+        centre[1] += s * middle[0] + c * middle[1]
+        centre[2] += half[2]
+        through[index] = _crossed(camera, point.reshape(1, 3), centre, turn, 0.85 * half)[0]
+    return through
+
+
+@njit(cache=True)
+def _box_around(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middle and half sizes of the box around parts, along the axes of their frame."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for row in rows:
+        cy, sy, cp, sp = (
+            abs(math.cos(row[YAW])),
+            abs(math.sin(row[YAW])),
+            abs(math.cos(row[PITCH])),
+            abs(math.sin(row[PITCH])),
+        )
+        reach = (
+            cy * cp * row[3] + sy * row[4] + cy * sp * row[5],
+            sy * cp * row[3] + cy * row[4] + sy * sp * row[5],
+            sp * row[3] + cp * row[5],
+        )
+        for axis in range(3):
+            low[axis], high[axis] = min(low[axis], row[axis] - reach[axis]), max(high[axis], row[axis] + reach[axis])
+    return 0.5 * (low + high), 0.5 * (high - low)
 
 
 def _hidden(camera: FloatArray, points: FloatArray, obstacles: list[ObstacleSpec]) -> MaskArray:
@@ -57,13 +91,23 @@ def _hidden(camera: FloatArray, points: FloatArray, obstacles: list[ObstacleSpec
     return hidden
 
 
+@njit(cache=True)
 def _crossed(
     camera: FloatArray, points: FloatArray, centre: FloatArray, rotation: FloatArray, half: FloatArray
 ) -> MaskArray:
     """Which of the segments from the camera to points, shape (n, 3), meet a box."""
-    begin, ends = (camera - centre) @ rotation, (points - centre) @ rotation
-    along = ends - begin
-    along = np.where(np.abs(along) < 1e-12, 1e-12, along)
-    near, far = (-half - begin) / along, (half - begin) / along
-    enter, leave = np.minimum(near, far).max(axis=1), np.maximum(near, far).min(axis=1)
-    return (enter <= leave) & (leave >= 0.0) & (enter <= 0.999)
+    crossed = np.zeros(len(points), np.bool_)
+    for i in range(len(points)):
+        enter, leave = -np.inf, np.inf
+        for axis in range(3):
+            begin = end = 0.0
+            for k in range(3):
+                begin += (camera[k] - centre[k]) * rotation[k, axis]
+                end += (points[i, k] - centre[k]) * rotation[k, axis]
+            along = end - begin
+            if abs(along) < 1e-12:
+                along = 1e-12
+            near, far = (-half[axis] - begin) / along, (half[axis] - begin) / along
+            enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+        crossed[i] = enter <= leave and leave >= 0.0 and enter <= 0.999
+    return crossed

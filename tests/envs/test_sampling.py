@@ -8,14 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fixation_gym.control.corridor import barred_directions, boxes_meet, free_directions, hand_boxes
+from fixation_gym.control.box_tests import boxes_meet
+from fixation_gym.control.corridor import barred_directions, free_directions, hand_boxes
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import SCENARIOS, Scenario
 from fixation_gym.envs.goal import Way
 from fixation_gym.envs.object_pool import target_shape
-from fixation_gym.envs.obstacle_kinds import MATERIALS
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.sampling import sample_scene
+from fixation_gym.envs.shapes import MATERIALS
 from fixation_gym.envs.visibility import visible_share
 from fixation_gym.geometry.boxes import box_set, joined
 from fixation_gym.geometry.rigid import look_at

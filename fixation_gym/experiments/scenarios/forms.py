@@ -11,13 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fixation_gym.envs.object_pool import THINGS
-from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS
+from fixation_gym.envs.obstacle_parts import draw_parts
 from fixation_gym.envs.shapes import Part, Shape, centred, scaled, without
+from fixation_gym.envs.things import THINGS
 from fixation_gym.types import Vector
 
 STAND = "stand"
-_LEANING = next(kind for kind in OBSTACLE_KINDS if kind.name == "leaning_board")
 _FOOT_SHARE = 9.0
 """Mass of a foot by that of the thing it holds: the centre of mass is over the foot."""
 _HALF_FOOT = 0.055
@@ -28,7 +27,7 @@ def draw_thing(kind: str, scales: tuple[float, float], rng: np.random.Generator)
     """A thing of a material; solid ones are often a leaning board, others have a label or not."""
     scale = float(rng.uniform(*scales))
     if kind == "opaque" and rng.random() < 0.25:
-        return scaled(centred("leaning board", _LEANING.draw(kind, rng), 0.6)[0], scale)
+        return scaled(centred("leaning board", draw_parts("leaning_board", kind, rng), 0.6)[0], scale)
     shapes = THINGS[kind]
     shape = scaled(shapes[int(rng.integers(len(shapes)))], scale)
     return without(shape, "label") if rng.random() < 0.5 else shape

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from fixation_gym.control.corridor import boxes_meet
+from fixation_gym.control.box_tests import boxes_meet
 from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.envs.shapes import Shape
 from fixation_gym.experiments.scenarios.forms import draw_thing, hung, raised, turned

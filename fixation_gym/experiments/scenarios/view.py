@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fixation_gym.control.corridor import approach_directions, boxes_meet, hand_boxes
+from fixation_gym.control.box_tests import boxes_meet
+from fixation_gym.control.corridor import approach_directions, hand_boxes
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
 from fixation_gym.experiments.scenarios.rules import plane_front

@@ -1,0 +1,110 @@
+"""Which ways obstacles bar, and which of them bar enough together: the compiled part of ``barriers.py``."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from fixation_gym.control.box_tests import Aligned, any_pair_meets, meets, part_of, scratch
+from fixation_gym.envs.drafts import Drafts, Indices
+from fixation_gym.geometry.boxes import BoxSet
+from fixation_gym.types import FloatArray, MaskArray
+
+
+class Quota(NamedTuple):
+    """How many ways may stay open in the end."""
+
+    groups: MaskArray
+    """Groups of ways, shape (n, ways)."""
+    most_open: FloatArray
+    """Largest share of each group that is not barred, shape (n,)."""
+
+
+@njit(cache=True)
+def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Aligned, quota: Quota) -> bool:
+    """Whether all drafts together would bar enough; most do not, which is soon known.
+
+    Args:
+        target: in base, shape (3,), m.
+        hands: axes of the hand on all ways, shape (n, 3, 3).
+        drafts: the obstacles.
+        smaller: what a hand sweeps that is smaller than the real one.
+        quota: how many ways may stay open.
+    """
+    room, sizes = scratch(), np.sum(quota.groups, axis=1)
+    counts = np.zeros(len(sizes), np.int64)
+    for way in range(len(hands)):
+        if meets(target, hands[way], drafts.boxes, smaller, room):
+            continue
+        for group in range(len(sizes)):
+            counts[group] += quota.groups[group, way]
+            if counts[group] / max(sizes[group], 1) > quota.most_open[group]:
+                return False
+    return True
+
+
+@njit(cache=True)
+def barred_ways(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Aligned) -> MaskArray:
+    """Ways that each of n drafts bars, shape (n, ways); arguments as above."""
+    barred, room = np.zeros((len(drafts.kinds), len(hands)), np.bool_), scratch()
+    for index in range(len(drafts.kinds)):
+        boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
+        for way in range(len(hands)):
+            barred[index, way] = meets(target, hands[way], boxes, smaller, room)
+    return barred
+
+
+@njit(cache=True)
+def apart_from(drafts: Drafts, others: BoxSet, gap: float) -> MaskArray:
+    """Which drafts keep about ``gap`` m away from other boxes."""
+    apart = np.ones(len(drafts.kinds), np.bool_)
+    for index in range(len(drafts.kinds)):
+        boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
+        apart[index] = not any_pair_meets(boxes, others, gap)
+    return apart
+
+
+@njit(cache=True)
+def is_barred(open_ways: MaskArray, sight: int, quota: Quota) -> bool:
+    """Whether the first line of sight, the way with index ``sight``, and enough of all other ways are barred."""
+    if open_ways[sight]:
+        return False
+    for group in range(len(quota.groups)):
+        size = max(np.sum(quota.groups[group]), 1)
+        if np.sum(quota.groups[group] & open_ways) / size > quota.most_open[group]:
+            return False
+    return True
+
+
+@njit(cache=True)
+def covering(
+    first: int,
+    others: MaskArray,
+    barred: MaskArray,
+    clashes: MaskArray,
+    sight: int,
+    quota: Quota,
+    counts: tuple[int, int],
+) -> Indices:
+    """Indices of ``first`` and of those others that bar enough with it, those that bar most taken first.
+
+    None if they do not; ``counts`` are the smallest and the largest number of them.
+    """
+    least, most = counts
+    chosen, open_ways = [first], ~barred[first]
+    left = others & ~clashes[first]
+    while len(chosen) < least or not is_barred(open_ways, sight, quota):
+        best, gain = 0, -1
+        for index in np.flatnonzero(left):
+            gained = np.sum(barred[index] & open_ways)
+            if gained > gain:
+                best, gain = index, gained
+        if len(chosen) == most or gain < 0 or (gain == 0 and len(chosen) >= least):
+            return np.zeros(0, np.int64)
+        chosen.append(best)
+        open_ways &= ~barred[best]
+        left &= ~clashes[best]
+        left[best] = False
+    return np.array(chosen)

@@ -1,0 +1,272 @@
+"""Obstacles that may come into a scene, as arrays: drawn by the dozen in one compiled call, as few are ever used."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fixation_gym.envs.config import Scenario
+from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS, kinds_of
+from fixation_gym.envs.obstacle_parts import write_parts
+from fixation_gym.envs.part_rows import COLUMNS, MOST_PARTS, PITCH, YAW, uniform
+from fixation_gym.envs.room import Room, steps_to_room
+from fixation_gym.envs.shapes import MATERIALS
+from fixation_gym.geometry.boxes import BoxSet, joined
+from fixation_gym.types import FloatArray, MaskArray
+
+Indices = NDArray[np.int64]
+
+_STEP_OUT = 0.02
+"""An obstacle that is in the free way is moved out by this much at a time, m."""
+
+
+class Menu(NamedTuple):
+    """What a scenario draws its obstacles from."""
+
+    materials: Indices
+    """Indices in ``MATERIALS``; the first obstacle is of the first one."""
+    kinds: MaskArray
+    """Which kinds there are for other obstacles and for the first one, shape (2, materials, kinds)."""
+    around: MaskArray
+    """Which kinds stand around the target."""
+    distances: FloatArray
+    """``ObstacleKind.distance`` of all kinds, shape (kinds, 2), m."""
+    steepness: FloatArray
+    """``ObstacleKind.steepness`` of all kinds, shape (kinds, 2)."""
+
+
+class Aim(NamedTuple):
+    """What obstacles are to leave free and to bar."""
+
+    target: FloatArray
+    """Centre of the target in the end, shape (3,), in base, m."""
+    azimuth: float
+    """Of the free way, in base, rad."""
+    free: FloatArray
+    """Direction of the free way, shape (3,)."""
+    ways: FloatArray
+    """Directions of all ways, shape (n, 3)."""
+    above: Indices
+    """Indices of those from above."""
+
+
+class Drafts(NamedTuple):
+    """What has room, if no other were there: what it is made of and where it stands, but not yet how it looks."""
+
+    kinds: Indices
+    materials: Indices
+    first: MaskArray
+    """Whether it was drawn as the first one of its scene."""
+    origins: FloatArray
+    """Of the floor frames, shape (n, 3), in base, m."""
+    facings: FloatArray
+    """Of these frames about the vertical, rad."""
+    ends: Indices
+    """The parts of draft i are those from ``ends[i]`` to ``ends[i + 1]``, shape (n + 1,)."""
+    rows: FloatArray
+    """Parts in the floor frames, as in ``part_rows``."""
+    boxes: BoxSet
+    """Boxes around the parts, in base."""
+
+
+@cache
+def menu_of(scenario: Scenario) -> Menu:
+    """What obstacles of a scenario are drawn from."""
+    materials = scenario.obstacle_materials
+    kinds = np.zeros((2, len(materials), len(OBSTACLE_KINDS)), bool)
+    for index, material in enumerate(materials):
+        made = kinds_of(material)
+        for first, names in ((0, scenario.obstacle_kinds), (1, scenario.first_kinds or scenario.obstacle_kinds)):
+            kinds[first, index] = [
+                kind in made and kind.name in names and (first == 1 or not kind.around) for kind in OBSTACLE_KINDS
+            ]
+    return Menu(
+        np.array([MATERIALS.index(name) for name in materials]),
+        kinds,
+        np.array([kind.around for kind in OBSTACLE_KINDS]),
+        np.array([kind.distance for kind in OBSTACLE_KINDS]),
+        np.array([kind.steepness for kind in OBSTACLE_KINDS]),
+    )
+
+
+def joined_drafts(first: Drafts, second: Drafts) -> Drafts:
+    """All of both."""
+    heads = (np.concatenate(pair) for pair in zip(first[:5], second[:5], strict=True))
+    ends = np.concatenate([first.ends, first.ends[-1] + second.ends[1:]])
+    return Drafts(*heads, ends, np.concatenate([first.rows, second.rows]), joined([first.boxes, second.boxes]))
+
+
+def chosen_drafts(drafts: Drafts, chosen: Indices) -> Drafts:
+    """Some of them."""
+    parts = [np.arange(drafts.ends[index], drafts.ends[index + 1]) for index in chosen]
+    rows = np.concatenate([np.zeros(0, np.int64), *parts])
+    ends = np.cumsum([0, *(len(part) for part in parts)])
+    boxes = BoxSet(*(values[rows] for values in drafts.boxes))
+    heads = (values[chosen] for values in drafts[:5])
+    return Drafts(*heads, ends, drafts.rows[rows], boxes)
+
+
+@njit(cache=True)
+def draw_for_ways(
+    counts: tuple[int, int], past: tuple[float, float], aim: Aim, room: Room, menu: Menu, rng: np.random.Generator
+) -> Drafts:
+    """Draw obstacles that bar ways: so many first ones and, if one of these has room, so many others.
+
+    Args:
+        counts: numbers of draws.
+        past: range of the angle by which they stand beyond the way that they are to bar, seen from the free one, rad.
+        aim: the ways.
+        room: what they keep clear of.
+        menu: what to draw from.
+        rng: generator.
+    """
+    drafts, kept = _empty(counts[0] + counts[1]), 0
+    for index in range(counts[0] + counts[1]):
+        first = index < counts[0]
+        if index == counts[0] and kept == 0:
+            break
+        # Half of the ways to be barred come from above, which is the harder to bar.
+        if rng.random() < 0.5:
+            way = aim.above[rng.integers(0, len(aim.above))]
+        else:
+            way = rng.integers(0, len(aim.ways))
+        kept += _draw(drafts, kept, first, aim.ways[way], past, aim, room, menu, rng)
+    return _filled(drafts, kept)
+
+
+@njit(cache=True)
+def draw_across(
+    count: int, sight: int, past: tuple[float, float], aim: Aim, room: Room, menu: Menu, rng: np.random.Generator
+) -> Drafts:
+    """Draw first obstacles that all stand beyond one way."""
+    drafts, kept = _empty(count), 0
+    for _ in range(count):
+        kept += _draw(drafts, kept, True, aim.ways[sight], past, aim, room, menu, rng)
+    return _filled(drafts, kept)
+
+
+@njit(cache=True)
+def _empty(count: int) -> Drafts:
+    most = count * MOST_PARTS
+    boxes = BoxSet(np.empty((most, 3)), np.empty((most, 3, 3)), np.empty((most, 3)))
+    kinds, materials, first = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.bool_)
+    ends, rows = np.zeros(count + 1, np.int64), np.empty((most, COLUMNS))
+    return Drafts(kinds, materials, first, np.empty((count, 3)), np.empty(count), ends, rows, boxes)
+
+
+@njit(cache=True)
+def _filled(drafts: Drafts, count: int) -> Drafts:
+    """The first ``count`` of them."""
+    most = drafts.ends[count]
+    boxes = BoxSet(drafts.boxes.centres[:most], drafts.boxes.rotations[:most], drafts.boxes.halves[:most])
+    return Drafts(
+        drafts.kinds[:count],
+        drafts.materials[:count],
+        drafts.first[:count],
+        drafts.origins[:count],
+        drafts.facings[:count],
+        drafts.ends[: count + 1],
+        drafts.rows[:most],
+        boxes,
+    )
+
+
+@njit(cache=True)
+def _draw(
+    drafts: Drafts,
+    index: int,
+    first: bool,
+    way: FloatArray,
+    past: tuple[float, float],
+    aim: Aim,
+    room: Room,
+    menu: Menu,
+    rng: np.random.Generator,
+) -> int:
+    """Draw an obstacle beyond ``way``, as near to the target as the free ways allow; returns 1 if it has room, or 0."""
+    beyond = _beyond(aim.free, way, uniform(rng, past[0], past[1]))
+    choice = 0 if first else rng.integers(0, len(menu.materials))
+    suitable = menu.kinds[int(first), choice] & (
+        menu.around | ((menu.steepness[:, 0] <= beyond[2]) & (beyond[2] <= menu.steepness[:, 1]))
+    )
+    kinds = np.flatnonzero(suitable)
+    if len(kinds) == 0:
+        return 0
+    kind = kinds[rng.integers(0, len(kinds))]
+    around, (nearest, farthest) = menu.around[kind], (menu.distances[kind, 0], menu.distances[kind, 1])
+    bearing = aim.azimuth if around else math.atan2(-beyond[1], -beyond[0]) + rng.normal(0.0, 0.2)
+    x, y = aim.target[0] - nearest * math.cos(bearing), aim.target[1] - nearest * math.sin(bearing)
+    facing = bearing + uniform(rng, -0.4, 0.4) + (math.pi if around else 0.0)
+    begin = drafts.ends[index]
+    end = begin + write_parts(drafts.rows[begin:], kind, menu.materials[choice], rng)
+    boxes = BoxSet(drafts.boxes.centres[begin:end], drafts.boxes.rotations[begin:end], drafts.boxes.halves[begin:end])
+    _place(drafts.rows[begin:end], x, y, room.height, facing, boxes)
+    outward = bearing + math.pi if around else bearing  # what stands around the target draws back from the way
+    step = np.array([-_STEP_OUT * math.cos(outward), -_STEP_OUT * math.sin(outward), 0.0])
+    steps = steps_to_room(boxes, step, int((farthest - nearest) / _STEP_OUT), room)
+    if steps < 0:
+        return 0
+    boxes.centres[:] += steps * step
+    drafts.kinds[index], drafts.materials[index], drafts.first[index] = kind, menu.materials[choice], first
+    drafts.origins[index] = np.array([x, y, room.height]) + steps * step
+    drafts.facings[index], drafts.ends[index + 1] = facing, end
+    return 1
+
+
+@njit(cache=True)
+def _place(rows: FloatArray, x: float, y: float, height: float, facing: float, boxes: BoxSet) -> None:
+    """Write the boxes around parts whose floor frame is at a place, turned by ``facing`` about the vertical."""
+    c, s = math.cos(facing), math.sin(facing)
+    for i in range(len(rows)):
+        row, centre, turn = rows[i], boxes.centres[i], boxes.rotations[i]
+        centre[0], centre[1], centre[2] = c * row[0] - s * row[1] + x, s * row[0] + c * row[1] + y, row[2] + height
+        boxes.halves[i] = row[3:6]
+        cy, sy = math.cos(row[YAW] + facing), math.sin(row[YAW] + facing)
+        cp, sp = math.cos(row[PITCH]), math.sin(row[PITCH])
+        turn[0, 0], turn[0, 1], turn[0, 2] = cy * cp, -sy, cy * sp
+        turn[1, 0], turn[1, 1], turn[1, 2] = sy * cp, cy, sy * sp
+        turn[2, 0], turn[2, 1], turn[2, 2] = -sp, 0.0, cp
+
+
+@njit(cache=True)
+def _beyond(free: FloatArray, way: FloatArray, angle: float) -> FloatArray:
+    """The direction that lies beyond ``way``, seen from the free one, by ``angle`` rad, but above the table.
+
+    What stands there bars the way without being in the free one: the hand is wide.
+    """
+    along = way[0] * free[0] + way[1] * free[1] + way[2] * free[2]
+    across = way - along * free
+    total = math.acos(min(max(along, -1.0), 1.0)) + angle
+    direction = math.cos(total) * free + math.sin(total) / max(_hypot(across), 1e-9) * across
+    direction[2] = max(direction[2], 0.05)
+    return direction / _hypot(direction)
+
+
+@njit(cache=True)
+def _hypot(vector: FloatArray) -> float:
+    """The length to the last bit, like ``math.hypot``, which numba knows for two numbers only."""
+    total, rest = 0.0, 0.0
+    for value in vector:
+        square, error = _square(value)
+        larger = total + square
+        rest += error + (total - (larger - (larger - total))) + (square - (larger - total))
+        total = larger
+    length = math.sqrt(total + rest)
+    if length == 0.0:
+        return 0.0
+    square, error = _square(length)
+    return length + (total - square - error + rest) / (2.0 * length)
+
+
+@njit(cache=True)
+def _square(value: float) -> tuple[float, float]:
+    """Square of a number, and the error of its rounding (Dekker)."""
+    large = value * 134217729.0  # 2 ** 27 + 1
+    high = large - (large - value)
+    low, square = value - high, value * value
+    return square, high * high - square + 2.0 * high * low + low * low
