@@ -97,6 +97,15 @@ def meets(target: FloatArray, axes: FloatArray, boxes: BoxSet, others: Aligned, 
 
 
 @njit(cache=True)
+def may_meet(
+    target: FloatArray, axes: FloatArray, middle: FloatArray, radius: float, others: Aligned, room: Scratch
+) -> bool:
+    """Whether anything within a sphere could meet a box along a camera's axes, (3, 3)."""
+    _turn(axes, middle, target, room[0])
+    return not _is_outside(room[0], others.low, others.high, radius + _SLACK)
+
+
+@njit(cache=True)
 def any_pair_meets(first: BoxSet, second: BoxSet, gap: float) -> bool:
     """Whether a box of one set comes nearer than about ``gap`` m to one of the other."""
     room = scratch()

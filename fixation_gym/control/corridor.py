@@ -5,7 +5,9 @@ Used by the servo on what it has seen, by the scene sampler, so that every scene
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numba import njit
@@ -118,6 +120,7 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
     return np.asarray(_any_holds(flat, *swept_hand(margin)[:2]).reshape(points.shape[:-1]))
 
 
+@cache
 def swept_hand(margin: float, wrist: bool = True) -> Aligned:
     """Boxes swept on a straight way, widened by a margin, m.
 
@@ -129,12 +132,21 @@ def swept_hand(margin: float, wrist: bool = True) -> Aligned:
 
 def level_axes(directions: FloatArray) -> FloatArray:
     """Rows x (right), y (down), z (forward) of level cameras that look against the directions, shape (n, 3, 3)."""
-    x, y, z = -directions.T
-    length = np.hypot(x, y)
-    right_x, right_y = y / length, -x / length  # forward x up
-    down = (-z * right_y, z * right_x, x * right_y - y * right_x)  # forward x right
-    rows = (right_x, right_y, np.zeros_like(x), *down, x, y, z)
-    return np.stack(rows, axis=1).reshape(-1, 3, 3)
+    return _level_axes(np.ascontiguousarray(directions, dtype=np.float64))
+
+
+@njit(cache=True)
+def _level_axes(directions: FloatArray) -> FloatArray:
+    axes = np.zeros((len(directions), 3, 3))
+    for i in range(len(directions)):
+        x, y, z = -directions[i, 0], -directions[i, 1], -directions[i, 2]
+        length = math.hypot(x, y)
+        right_x, right_y = y / length, -x / length  # forward x up
+        axes[i, 0, 0], axes[i, 0, 1] = right_x, right_y
+        # forward x right
+        axes[i, 1, 0], axes[i, 1, 1], axes[i, 1, 2] = -z * right_y, z * right_x, x * right_y - y * right_x
+        axes[i, 2, 0], axes[i, 2, 1], axes[i, 2, 2] = x, y, z
+    return axes
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Aligned, any_pair_meets, meets, part_of, scratch
+from fixation_gym.control.box_tests import Aligned, any_pair_meets, may_meet, meets, part_of, scratch, sphere_around
 from fixation_gym.envs.drafts import Drafts, Indices
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray, MaskArray
@@ -51,8 +51,10 @@ def barred_ways(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: 
     barred, room = np.zeros((len(drafts.kinds), len(hands)), np.bool_), scratch()
     for index in range(len(drafts.kinds)):
         boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
+        middle, radius = sphere_around(boxes)
         for way in range(len(hands)):
-            barred[index, way] = meets(target, hands[way], boxes, smaller, room)
+            if may_meet(target, hands[way], middle, radius, smaller, room):
+                barred[index, way] = meets(target, hands[way], boxes, smaller, room)
     return barred
 
 

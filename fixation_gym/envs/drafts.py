@@ -131,10 +131,8 @@ def draw_for_ways(
         if index == counts[0] and kept == 0:
             break
         # Half of the ways to be barred come from above, which is the harder to bar.
-        if rng.random() < 0.5:
-            way = aim.above[rng.integers(0, len(aim.above))]
-        else:
-            way = rng.integers(0, len(aim.ways))
+        above = rng.random() < 0.5
+        way = aim.above[rng.integers(0, len(aim.above))] if above else rng.integers(0, len(aim.ways))
         kept += _draw(drafts, kept, first, aim.ways[way], past, aim, room, menu, rng)
     return _filled(drafts, kept)
 
@@ -191,10 +189,7 @@ def _draw(
     """Draw an obstacle beyond ``way``, as near to the target as the free ways allow; returns 1 if it has room, or 0."""
     beyond = _beyond(aim.free, way, uniform(rng, past[0], past[1]))
     choice = 0 if first else rng.integers(0, len(menu.materials))
-    suitable = menu.kinds[int(first), choice] & (
-        menu.around | ((menu.steepness[:, 0] <= beyond[2]) & (beyond[2] <= menu.steepness[:, 1]))
-    )
-    kinds = np.flatnonzero(suitable)
+    kinds = _suitable_kinds(menu, menu.kinds[int(first), choice], beyond[2])
     if len(kinds) == 0:
         return 0
     kind = kinds[rng.integers(0, len(kinds))]
@@ -216,6 +211,18 @@ def _draw(
     drafts.origins[index] = np.array([x, y, room.height]) + steps * step
     drafts.facings[index], drafts.ends[index + 1] = facing, end
     return 1
+
+
+@njit(cache=True)
+def _suitable_kinds(menu: Menu, kinds: MaskArray, steepness: float) -> Indices:
+    """Those of some kinds that stand around the target, or where the sine of the elevation is ``steepness``."""
+    found, count = np.empty(len(kinds), np.int64), 0
+    for kind in range(len(kinds)):
+        fits = menu.steepness[kind, 0] <= steepness and steepness <= menu.steepness[kind, 1]
+        if kinds[kind] and (fits or menu.around[kind]):
+            found[count] = kind
+            count += 1
+    return found[:count]
 
 
 @njit(cache=True)

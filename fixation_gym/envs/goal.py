@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from fixation_gym.control.corridor import hand_axes, swept_hand
+from fixation_gym.control.corridor import hand_axes, level_axes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.placement import sample_push
 from fixation_gym.envs.room import FREE_ROOM, Room
 from fixation_gym.envs.scene import TargetSpec
-from fixation_gym.geometry.boxes import box_set
+from fixation_gym.geometry.boxes import BoxSet, box_set
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
 _CONE = math.radians(5.0)
 """Half angle of the cone of free ways, rad."""
+_AROUND = np.array([(math.cos(angle), math.sin(angle)) for angle in np.radians(range(0, 360, 60))])
+"""Where the rim of the cone is, shape (n, 2)."""
 _NEAR_FREE = math.radians(12.0)
 """Ways this near to the free one need not be barred, rad."""
 _LARGEST_ROLL, _LOW_ROLL = math.radians(45.0), math.radians(20.0)
@@ -72,6 +75,7 @@ def sample_goal(scenario: Scenario, free_angles: tuple[float, float], rng: np.ra
     return Goal(target, free, room, ways, near_free, _elevations_within(scenario.free_elevation_deg))
 
 
+@cache
 def _elevations_within(bounds_deg: tuple[float, float]) -> MaskArray:
     """Which ways of the reach's grid are of an elevation within these bounds, or nearest to it."""
     low, high = np.radians(bounds_deg)
@@ -81,7 +85,7 @@ def _elevations_within(bounds_deg: tuple[float, float]) -> MaskArray:
 
 def sample_target(scenario: Scenario, rng: np.random.Generator) -> TargetSpec:
     """Draw a red object somewhere in the target region."""
-    shape = target_shape(str(rng.choice(scenario.target_shapes)))
+    shape = target_shape(scenario.target_shapes[int(rng.integers(len(scenario.target_shapes)))])
     width = rng.uniform(*scenario.grasp_width)
     ratio = width / (2.0 * shape.half_extent[1])
     # Thin boxes and cylinders are taller than wide, so that oblique fingers reach them above the table.
@@ -121,19 +125,17 @@ def _grasped_yaw(target: TargetSpec, free: Way, rng: np.random.Generator) -> flo
 
 def _room(target: TargetSpec, free: Way) -> Room:
     """What obstacles must keep clear of: the target and a cone of free ways, its axis also for a turned hand."""
-    axis = free.direction
-    across = np.cross(axis, [0.0, 0.0, 1.0])
-    across /= np.linalg.norm(across)
-    angles = np.linspace(0.0, 2.0 * math.pi, 6, endpoint=False)[:, None]
-    around = np.cos(angles) * across + np.sin(angles) * np.cross(axis, across)
-    rim = math.cos(_CONE) * axis + math.sin(_CONE) * around
+    axis, places, box = free.direction, target.places, box_set([target.box])
+    right, down, _ = level_axes(axis[None])[0]
+    rim = math.cos(_CONE) * axis + math.sin(_CONE) * (_AROUND @ [right, down])
+    ways = level_axes(np.vstack([axis, rim]))
     turns = _grasp_turns(target, free)
-    ways = np.vstack([axis, rim, *[axis[None]] * len(turns)])
-    rolls = np.array([0.0] * (1 + len(rim)) + turns)
-    ends = target.places[[0, -1]] if target.motion else target.places[:1]
-    reds = box_set([replace(target.box, centre=place) for place in target.places])
-    place = ROBOT.workspace
-    return Room(place.table_height, np.array(place.table), reds, ends, hand_axes(ways, rolls), swept_hand(FREE_ROOM))
+    if turns:
+        ways = np.concatenate([ways, hand_axes(axis[None], np.array(turns))])
+    ends = places[[0, -1]] if target.motion else places[:1]
+    reds = BoxSet(places, box.rotations.repeat(len(places), axis=0), box.halves.repeat(len(places), axis=0))
+    table = ROBOT.workspace
+    return Room(table.table_height, np.array(table.table), reds, ends, ways, swept_hand(FREE_ROOM))
 
 
 def _grasp_turns(target: TargetSpec, free: Way) -> list[float]:

@@ -48,23 +48,33 @@ def steps_to_room(boxes: BoxSet, step: FloatArray, most: int, room: Room) -> int
         most: largest number of steps.
         room: what it must keep clear of.
     """
-    count, latest, rest = 0, 0, scratch()
-    pairs = len(room.ends) * len(room.ways)
-    while count <= most:
-        moved = BoxSet(boxes.centres + count * step, boxes.rotations, boxes.halves)
-        free = _within_bounds(moved, room.table, room.reds.centres[0])
-        free = free and not any_pair_meets(moved, room.reds, _TARGET_GAP)
-        pair = 0
-        while free and pair < pairs:
+    rest, latest, ways = scratch(), 0, len(room.ways)
+    moved = BoxSet(boxes.centres.copy(), boxes.rotations, boxes.halves)
+    for count in range(most + 1):
+        for i in range(len(boxes.centres)):
+            for axis in range(3):
+                moved.centres[i, axis] = boxes.centres[i, axis] + count * step[axis]
+        met = -1
+        for pair in range(len(room.ends) * ways):
             # What was met a step ago is probably met once more.
-            end, way = divmod((latest + pair) % pairs, len(room.ways))
-            if meets(room.ends[end], room.ways[way], moved, room.swept, rest):
-                free, latest = False, (latest + pair) % pairs
-            pair += 1
-        if free:
+            way = (latest + pair) % (len(room.ends) * ways)
+            if meets(room.ends[way // ways], room.ways[way % ways], moved, room.swept, rest):
+                met = way
+                break
+            if pair == 0 and not _is_clear(moved, room):
+                met = latest
+                break
+        if met < 0:
             return count
-        count += 1
+        latest = met
     return -1
+
+
+@njit(cache=True)
+def _is_clear(boxes: BoxSet, room: Room) -> bool:
+    """Whether an obstacle is above the table and beside the target."""
+    within = _within_bounds(boxes, room.table, room.reds.centres[0])
+    return within and not any_pair_meets(boxes, room.reds, _TARGET_GAP)
 
 
 def holds(room: Room, boxes: BoxSet) -> bool:
