@@ -148,7 +148,7 @@ def bar_ways(
     if scenario.through_sight:
         firsts = firsts & pass_through(pool.drafts, view.camera, goal.room.ends[0])
     others = usable & ~pool.drafts.first
-    for first in np.flatnonzero(firsts):
+    for first in np.flatnonzero(firsts).tolist():
         chosen = covering(
             first, others, pool.barred, pool.clashes, view.first_sight, pool.quota, scenario.obstacle_count
         )

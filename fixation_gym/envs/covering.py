@@ -99,8 +99,8 @@ def covering(
     left = others & ~clashes[first]
     while len(chosen) < least or not is_barred(open_ways, sight, quota):
         best, gain = 0, -1
-        for index in np.flatnonzero(left):
-            gained = np.sum(barred[index] & open_ways)
+        for index in range(len(left)):
+            gained = np.sum(barred[index] & open_ways) if left[index] else -1
             if gained > gain:
                 best, gain = index, gained
         if len(chosen) == most or gain < 0 or (gain == 0 and len(chosen) >= least):

@@ -96,19 +96,32 @@ def menu_of(scenario: Scenario) -> Menu:
 
 def joined_drafts(first: Drafts, second: Drafts) -> Drafts:
     """All of both."""
-    heads = (np.concatenate(pair) for pair in zip(first[:5], second[:5], strict=True))
-    ends = np.concatenate([first.ends, first.ends[-1] + second.ends[1:]])
-    return Drafts(*heads, ends, np.concatenate([first.rows, second.rows]), joined([first.boxes, second.boxes]))
+    return Drafts(
+        np.concatenate([first.kinds, second.kinds]),
+        np.concatenate([first.materials, second.materials]),
+        np.concatenate([first.first, second.first]),
+        np.concatenate([first.origins, second.origins]),
+        np.concatenate([first.facings, second.facings]),
+        np.concatenate([first.ends, first.ends[-1] + second.ends[1:]]),
+        np.concatenate([first.rows, second.rows]),
+        joined([first.boxes, second.boxes]),
+    )
 
 
 def chosen_drafts(drafts: Drafts, chosen: Indices) -> Drafts:
-    """Some of them."""
-    parts = [np.arange(drafts.ends[index], drafts.ends[index + 1]) for index in chosen]
-    rows = np.concatenate([np.zeros(0, np.int64), *parts])
-    ends = np.cumsum([0, *(len(part) for part in parts)])
-    boxes = BoxSet(*(values[rows] for values in drafts.boxes))
-    heads = (values[chosen] for values in drafts[:5])
-    return Drafts(*heads, ends, drafts.rows[rows], boxes)
+    """Some of them, in the order of their indices."""
+    counts = np.diff(drafts.ends)
+    parts = np.isin(np.repeat(np.arange(len(counts)), counts), chosen)
+    return Drafts(
+        drafts.kinds[chosen],
+        drafts.materials[chosen],
+        drafts.first[chosen],
+        drafts.origins[chosen],
+        drafts.facings[chosen],
+        np.concatenate([[0], np.cumsum(counts[chosen])]),
+        drafts.rows[parts],
+        BoxSet(drafts.boxes.centres[parts], drafts.boxes.rotations[parts], drafts.boxes.halves[parts]),
+    )
 
 
 @njit(cache=True)
