@@ -117,7 +117,8 @@ def in_corridor(points: FloatArray, margin: float) -> MaskArray:
         Mask of shape (...).
     """
     flat = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-    return np.asarray(_any_holds(flat, *swept_hand(margin)[:2]).reshape(points.shape[:-1]))
+    hand = swept_hand(margin)
+    return np.asarray(_any_holds(flat, hand.centres, hand.halves).reshape(points.shape[:-1]))
 
 
 @cache

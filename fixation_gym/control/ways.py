@@ -130,10 +130,10 @@ def known_ways(points: FloatArray, weights: FloatArray, target: FloatArray, seen
         margin: by which a hand is smaller and larger than it is, between which points count ever less, m.
     """
     ways = directions(REACH_GRID, target)
-    centres, halves = swept_hand(0.0)
+    hand = swept_hand(0.0)
     # What is remembered is a centimetre or two off: the deeper it is in a corridor the more it counts.
     margins = np.array([margin, 0.0, -margin])
-    evidence = _evidence_in(level_axes(ways), points - target, weights, centres, halves, margins)
+    evidence = _evidence_in(level_axes(ways), points - target, weights, hand.centres, hand.halves, margins)
     return Ways(ways, evidence, seen.unseen_shares)
 
 
