@@ -144,7 +144,7 @@ def pairs_that_meet(boxes: BoxSet, ends: NDArray[np.int64], gap: float) -> MaskA
                 continue
             others = part_of(boxes, ends[j], ends[j + 1])
             for box in range(ends[i], ends[i + 1]):
-                if _one_meets(boxes, box, others, gap, _length(boxes.halves[box]) + gap, room):
+                if _one_meets(boxes, box, others, gap, _length(boxes.halves[box]) + 2.0 * gap, room):
                     meet[i, j] = meet[j, i] = True
                     break
     return meet
