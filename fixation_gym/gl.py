@@ -53,6 +53,10 @@ class MissingGLError(RuntimeError):
     """No GL library renders here. The message is one line that names what to install."""
 
 
+class LostGLError(MissingGLError):
+    """A GL context that was open is gone. The message is one line that says how to go on."""
+
+
 def select_backend() -> str:
     """Choose a working backend and set ``MUJOCO_GL`` and ``PYOPENGL_PLATFORM`` to it.
 
@@ -154,6 +158,29 @@ def borrowed_thread() -> Iterator[None]:
             EGL.eglMakeCurrent(display, *surfaces, before)
         elif ours := EGL.eglGetCurrentDisplay():
             EGL.eglMakeCurrent(ours, EGL.EGL_NO_SURFACE, EGL.EGL_NO_SURFACE, EGL.EGL_NO_CONTEXT)
+
+
+@contextlib.contextmanager
+def losses_told() -> Iterator[None]:
+    """Render meanwhile; a context that is gone, with the display or alone, is told in one sentence.
+
+    Raises:
+        LostGLError: if it is. EGL is then asked for a display again when the next context is opened.
+    """
+    try:
+        yield
+    except Exception as error:
+        from OpenGL.error import GLError
+
+        if not isinstance(error, GLError):
+            raise
+        if mujoco_egl := sys.modules.get("mujoco.egl"):
+            mujoco_egl.EGL_DISPLAY = None  # pyright: ignore[reportAttributeAccessIssue]
+        reason = getattr(getattr(error, "err", None), "name", type(error).__name__)
+        raise LostGLError(
+            f"the GL context is gone ({reason}): another library shut EGL down, or the graphics driver began again; "
+            "close() the environment and reset() it, or run the program again"
+        ) from error
 
 
 def renders(backend: str) -> bool:

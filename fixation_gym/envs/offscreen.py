@@ -26,7 +26,7 @@ class Offscreen(mujoco.Renderer):
         self._gl_context = self._mjr_context = None  # there is nothing to close yet
         gl.require_own_context()
         self._process = os.getpid()
-        with gl.borrowed_thread():
+        with gl.losses_told(), gl.borrowed_thread():
             super().__init__(model, height, width)
             gl.note_context()
         # Freed before EGL shuts down, which MuJoCo registered when it made the context; later, EGL complains.
@@ -37,25 +37,33 @@ class Offscreen(mujoco.Renderer):
 
         Raises:
             RuntimeError: in a process forked since the context was opened, where GL would wait for ever.
+            LostGLError: if the context is gone.
         """
         if os.getpid() != self._process:
             gl.require_own_context()
-        with gl.borrowed_thread():
+        with gl.losses_told(), gl.borrowed_thread():
             return super().render(out=out)
 
     def close(self) -> None:
-        """Free the GL context; may be called twice."""
+        """Free the GL context, or forget it if it is gone; may be called twice."""
         if self._gl_context is None:
             return
         atexit.unregister(self._close_at_exit)
-        with gl.borrowed_thread():
-            super().close()
+        try:
+            with gl.losses_told(), gl.borrowed_thread():
+                super().close()
+        except gl.LostGLError:
+            self._forget()
 
     def _close_at_exit(self) -> None:
         """Free the GL context, unless another library, such as robosuite, has shut EGL down and it with that."""
         try:
             self.close()
         except Exception:  # PyOpenGL's, which may be unloaded by now
-            if self._gl_context is not None:
-                self._gl_context._context = None
-            self._gl_context = self._mjr_context = None
+            self._forget()
+
+    def _forget(self) -> None:
+        """Drop a context that is gone, without asking GL."""
+        if self._gl_context is not None:
+            self._gl_context._context = None
+        self._gl_context = self._mjr_context = None

@@ -152,6 +152,41 @@ def test_robosuite_renders_between_our_steps_and_the_program_ends_without_a_word
     assert "Error" not in result.stderr
 
 
+LOST = """
+import gymnasium as gym, numpy as np, fixation_gym
+from fixation_gym.gl import LostGLError, select_backend
+if select_backend() != "egl":
+    raise SystemExit("EGL is needed here")
+import mujoco.egl
+from OpenGL import EGL
+env = gym.make("FixationPickZFC-v0", image_size=(64, 80))
+env.reset(seed=0)
+context = env.unwrapped.wrist_view.renderer._gl_context._context
+display = mujoco.egl.EGL_DISPLAY
+{loss}
+try:
+    env.step(env.action_space.sample())
+except LostGLError as error:
+    print(error)
+env.close()
+env.reset(seed=0)
+print(env.step(np.zeros(4, np.float32))[0]["zfc_map"].shape)
+"""
+
+
+@pytest.mark.parametrize(
+    ("loss", "reason"),
+    [("EGL.eglTerminate(display)", "EGL_BAD_DISPLAY"), ("EGL.eglDestroyContext(display, context)", "EGL_BAD_CONTEXT")],
+)
+def test_a_context_that_is_gone_is_told_in_one_sentence_and_a_reset_opens_another(loss, reason):
+    result = python(LOST.format(loss=loss))
+    told, shape = result.stdout.splitlines()
+    assert told.startswith(f"the GL context is gone ({reason}): another library shut EGL down")
+    assert "close() the environment and reset() it" in told
+    assert shape == "(1, 32, 32)"
+    assert result.stderr == ""
+
+
 @pytest.mark.parametrize("make", [FixationPickEnv, FixationPickZFC])
 def test_a_step_before_the_reset_or_after_the_end_says_so(make):
     env = make(image_size=SMALL)
