@@ -10,6 +10,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+UNFINISHED = ".unfinished"
+"""How the names of files end that are being written, or were when their process was killed."""
+
+
+def unfinished_file(path: Path) -> Path:
+    """Where this process writes a file before it gets its name; what a kill leaves is removed by the next run."""
+    return path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
+
 
 def write_file(path: Path, data: bytes) -> None:
     """Write a file, completely or not at all; it is on the disk when this returns.
@@ -17,7 +25,7 @@ def write_file(path: Path, data: bytes) -> None:
     Raises:
         OSError: if it cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = unfinished_file(path)
     try:
         with temporary.open("wb") as file:
             file.write(data)

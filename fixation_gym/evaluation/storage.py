@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.files import write_json
+from fixation_gym.evaluation.files import UNFINISHED, write_json
 from fixation_gym.evaluation.rollout import EpisodeKey, EpisodeResult
 from fixation_gym.evaluation.trace import TRACES_FOLDER, trace_file, write_trace
 
@@ -48,7 +48,9 @@ def make_folder(folder: Path) -> None:
 
 @contextlib.contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
-    """Keep every other run out of a folder. The lock is on the folder itself, so that it leaves no file behind.
+    """Keep every other run out of a folder, and remove what killed ones left half-written in it.
+
+    The lock is on the folder itself, so that it leaves no file behind.
 
     Raises:
         UsageError: if another run has the lock, or the folder cannot be opened.
@@ -64,9 +66,25 @@ def folder_lock(folder: Path) -> Iterator[None]:
             raise UsageError(f"{folder} is in use by another run; choose another --out") from error
         except OSError:  # network file systems may not lock folders; there the user has to take care
             pass
+        _remove_unfinished(folder)
         yield
     finally:
         os.close(descriptor)
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove the files that killed processes left half-written; the folder must be locked.
+
+    Folders below are searched only in one that holds a run, and not those that hold a run of their own.
+    """
+    for place, below, names in os.walk(folder):
+        for name in names:
+            if name.startswith(".") and name.endswith(UNFINISHED):
+                (Path(place) / name).unlink(missing_ok=True)
+        if RUN_FILE in names or Path(place) != folder:
+            below[:] = [name for name in below if not (Path(place) / name / RUN_FILE).exists()]
+        else:
+            below.clear()
 
 
 def check_no_folders(folder: Path, names: Iterable[str]) -> None:

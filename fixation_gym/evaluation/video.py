@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import subprocess
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
@@ -10,11 +14,12 @@ import cv2
 import imageio_ffmpeg
 import numpy as np
 
-from fixation_gym.evaluation.files import write_file
+from fixation_gym.evaluation.files import unfinished_file, write_file
 from fixation_gym.types import ImageArray
 
 _CAPTION_HEIGHT = 26
 _GAP = 4
+_WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 
 
 class VideoWriter:
@@ -26,35 +31,29 @@ class VideoWriter:
     def __init__(self, path: Path, fps: float, crf: int = 23) -> None:
         """Prepare a video; the first frame decides its size. ``crf`` 0 is without loss, more is smaller."""
         self._path = path
-        self._temporary = path.with_name(f".{path.stem}.part{path.suffix}")
+        self._temporary = unfinished_file(path)
         self._fps, self._crf = fps, crf
         self._shape: tuple[int, ...] | None = None
-        self._encoder = None
+        self._encoder: subprocess.Popen[bytes] | None = None
 
     def add(self, frame: ImageArray) -> None:
         """Append a frame, shape (H, W, 3), RGB.
 
         Raises:
             ValueError: if its shape is not that of the first frame.
+            OSError: if the video cannot be written.
         """
         if self._encoder is None:
             self._shape = frame.shape
-            height, width = (size + size % 2 for size in frame.shape[:2])
-            self._encoder = imageio_ffmpeg.write_frames(
-                str(self._temporary),
-                (width, height),
-                fps=self._fps,  # pyright: ignore[reportArgumentType]  (declared int, but fractions work)
-                codec="libx264",
-                pix_fmt_in="rgb24",
-                pix_fmt_out="yuv420p",
-                macro_block_size=2,
-                output_params=["-movflags", "+faststart", "-crf", str(self._crf)],
-                ffmpeg_log_level="error",
-            )
-            self._encoder.send(None)
+            self._encoder = self._start()
         if frame.shape != self._shape:
             raise ValueError(f"all frames must have shape {self._shape}, got {frame.shape}")
-        self._encoder.send(np.ascontiguousarray(_pad_to_even(frame)))
+        assert self._encoder.stdin is not None
+        assert self._encoder.stderr is not None
+        try:
+            self._encoder.stdin.write(np.ascontiguousarray(_pad_to_even(frame)))
+        except BrokenPipeError:
+            raise _write_error(self._path, self._encoder.stderr.read()) from None
 
     def __enter__(self) -> VideoWriter:
         return self
@@ -63,12 +62,42 @@ class VideoWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         try:
-            if self._encoder is not None:
-                self._encoder.close()
-                if error is None:
-                    self._temporary.replace(self._path)
+            if self._encoder is None:
+                return
+            if error is not None:
+                self._encoder.kill()
+            _, complaints = self._encoder.communicate()
+            if error is None:
+                if self._encoder.returncode != 0:
+                    raise _write_error(self._path, complaints)
+                self._temporary.replace(self._path)
         finally:
             self._temporary.unlink(missing_ok=True)
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        """Run ffmpeg, which encodes what it reads."""
+        assert self._shape is not None
+        height, width = (size + size % 2 for size in self._shape[:2])
+        rate = str(Fraction(self._fps).limit_denominator())
+        raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", rate, "-i", "-")
+        encoded = ("-vcodec", "libx264", "-pix_fmt", "yuv420p", "-crf", str(self._crf), "-movflags", "+faststart")
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error", *raw, "-an", *encoded, "-f", "mp4"]
+        # In a session of its own, so that Ctrl-C reaches this process alone.
+        return subprocess.Popen(
+            [*command, str(self._temporary)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+
+
+def _write_error(path: Path, complaints: bytes) -> OSError:
+    """What ffmpeg's complaints mean: it prints the system's reason, but ends with numbers of its own."""
+    text = complaints.decode(errors="replace").strip()
+    number = next((number for number in _WRITE_ERRORS if os.strerror(number) in text), errno.EIO)
+    reason = os.strerror(number) if number != errno.EIO else (text.splitlines() or ["ffmpeg was killed"])[-1]
+    return OSError(number, reason, str(path))
 
 
 def caption(frame: ImageArray, text: str) -> ImageArray:

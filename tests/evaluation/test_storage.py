@@ -10,7 +10,7 @@ import pytest
 from evaluation_fakes import FakeEnv, FakePolicy
 
 from fixation_gym.errors import UsageError
-from fixation_gym.evaluation.files import write_json
+from fixation_gym.evaluation.files import unfinished_file, write_json
 from fixation_gym.evaluation.rollout import run_episode
 from fixation_gym.evaluation.storage import (
     EPISODES_FILE,
@@ -149,3 +149,25 @@ def test_a_folder_that_cannot_be_made_is_an_error_and_leaves_nothing(tmp_path: P
     with pytest.raises(UsageError, match="cannot write to the output folder"):
         make_folder(tmp_path / "file" / "out")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_what_a_kill_left_half_written_is_removed_by_the_next_run_and_nothing_else(tmp_path: Path) -> None:
+    fill(tmp_path, range(1))
+    (tmp_path / "videos" / "deep").mkdir(parents=True)
+    fill(tmp_path / "another", range(1))
+    torn = unfinished_file(tmp_path / SUMMARY_FILE)
+    below = unfinished_file(tmp_path / "videos" / "deep" / "a.mp4")
+    others = unfinished_file(tmp_path / "another" / SUMMARY_FILE)
+    mine = tmp_path / ".notes.tmp"
+    for path in (torn, below, others, mine):
+        path.write_bytes(b"half")
+    assert stored_seeds(tmp_path) == [0]
+    assert [path.exists() for path in (torn, below, others, mine)] == [False, False, True, True]
+
+
+def test_a_folder_without_a_run_is_not_searched(tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    foreign = unfinished_file(tmp_path / "photos" / "a.jpg")
+    foreign.write_bytes(b"half")
+    with folder_lock(tmp_path):
+        assert foreign.exists()

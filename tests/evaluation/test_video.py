@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -97,3 +98,29 @@ def test_evenly_spaced_keeps_first_and_last() -> None:
     frames = [plain((value, 0, 0)) for value in range(101)]
     assert [int(frame[0, 0, 0]) for frame in evenly_spaced(frames, 5)] == [0, 25, 50, 75, 100]
     assert len(evenly_spaced(frames[:3], 5)) == 3
+
+
+@pytest.mark.parametrize("reads", ["cat >/dev/null", ":"])
+@pytest.mark.parametrize(
+    ("complaint", "number", "reason"),
+    [
+        ("[out#0/mp4 @ 0x5] Error closing file: No space left on device", errno.ENOSPC, "No space left on device"),
+        ("x264: bad luck", errno.EIO, "x264: bad luck"),
+        ("", errno.EIO, "ffmpeg was killed"),
+    ],
+)
+def test_a_video_that_ffmpeg_could_not_write_is_an_error_and_keeps_the_one_before(
+    reads: str, complaint: str, number: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ffmpeg = tmp_path / "ffmpeg"
+    ffmpeg.write_text(f"#!/bin/sh\n{reads}\necho '{complaint}' >&2\nexit 228\n")
+    ffmpeg.chmod(0o755)
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(ffmpeg))
+    (tmp_path / "out").mkdir()
+    path = tmp_path / "out" / "a.mp4"
+    path.write_bytes(b"before")
+    with pytest.raises(OSError, match=reason) as caught:
+        write_video(path, [plain((220, 20, 20), 300, 400)] * 5)
+    assert (caught.value.errno, caught.value.filename) == (number, str(path))
+    assert path.read_bytes() == b"before"
+    assert list(path.parent.iterdir()) == [path]
