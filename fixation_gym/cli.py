@@ -225,6 +225,12 @@ def parse(argv: Sequence[str] | None) -> Command:
         UsageError: with tyro's message, which it would print as a box, as one line.
         SystemExit: after ``--help``.
     """
+    given = sys.argv[1:] if argv is None else list(argv)
+    for argument in given:
+        try:
+            argument.encode()
+        except UnicodeEncodeError:
+            raise UsageError(f"arguments must be valid UTF-8, got {argument!a}") from None
     output = io.StringIO()
     try:
         with contextlib.redirect_stderr(output):
@@ -232,7 +238,7 @@ def parse(argv: Sequence[str] | None) -> Command:
                 Commands,
                 prog="fixation-gym",
                 description="Gaze fixation for robots: distance and obstacles from one's own motion.",
-                args=None if argv is None else list(argv),
+                args=given,
                 config=(tyro.conf.SuppressFixed,),
             )
     except SystemExit as exit_:

@@ -49,23 +49,47 @@ class Observation:
         """Convert an observation of ``FixationPick-v0``.
 
         Raises:
-            KeyError: if a key is missing, naming the missing ones.
+            ValueError: if a key is missing or has a value of another shape or kind; the message names it.
         """
         missing = sorted({"time", "rgb", *_VECTOR_KEYS, "gripper_width"} - set(obs))
         if missing:
-            raise KeyError(f"observation lacks {missing}; it needs the keys of FixationPick-v0")
-        vectors = {key: np.asarray(obs[key], dtype=np.float64) for key in _VECTOR_KEYS}
+            raise ValueError(f"observation lacks {missing}; it needs the keys of FixationPick-v0")
+        vectors = {key: _numbers(obs, key, *shape) for key, shape in _VECTOR_KEYS.items()}
+        if vectors["joint_pos"].shape != vectors["joint_vel"].shape:
+            raise ValueError("observation has joint_pos and joint_vel of different lengths")
+        rgb = np.asarray(obs["rgb"])
+        if rgb.dtype != np.uint8 or rgb.ndim != 3 or rgb.shape[2] != 3:
+            raise ValueError(f"observation rgb must be uint8 of shape (H, W, 3), got {rgb.dtype} of shape {rgb.shape}")
+        mask = np.asarray(obs["mask"]) if "mask" in obs else None
+        if mask is not None and (mask.dtype.kind not in "bui" or mask.shape != rgb.shape[:2]):
+            raise ValueError(f"observation mask must be true or false per pixel of rgb, shape {rgb.shape[:2]}")
         return cls(
-            time=float(np.asarray(obs["time"]).item()),
-            rgb=np.asarray(obs["rgb"], dtype=np.uint8),
-            gripper_width=float(np.asarray(obs["gripper_width"]).item()),
-            target_box=np.asarray(obs["target_box"], np.float64) if "target_box" in obs else None,
-            mask=np.asarray(obs["mask"], np.bool_) if "mask" in obs else None,
+            time=float(_numbers(obs, "time", 1)[0]),
+            rgb=rgb,
+            gripper_width=float(_numbers(obs, "gripper_width", 1)[0]),
+            target_box=_numbers(obs, "target_box", 4) if "target_box" in obs else None,
+            mask=None if mask is None else mask.astype(np.bool_),
             **vectors,
         )
 
 
-_VECTOR_KEYS = ("joint_pos", "joint_vel", "camera_pose", "camera_twist")
+_VECTOR_KEYS: dict[str, tuple[int, ...]] = {"joint_pos": (), "joint_vel": (), "camera_pose": (7,), "camera_twist": (6,)}
+"""Their lengths; an arm has as many joints as it has."""
+
+
+def _numbers(obs: Mapping[str, Any], key: str, length: int | None = None) -> FloatArray:
+    """A finite vector of an observation; a single number is one of length 1."""
+    values = np.asarray(obs[key])
+    if length == 1 and values.size == 1:
+        values = values.reshape(1)
+    numbers = values.dtype.kind in "fiu"
+    if not numbers or values.ndim != 1 or (length is not None and len(values) != length):
+        wanted = "a vector of" if length is None else str(length)
+        found = f"{values.dtype} of shape {values.shape}"
+        raise ValueError(f"observation {key} must be {wanted} finite numbers, got {found}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"observation {key} must be finite, got {values.tolist()}")
+    return values.astype(np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

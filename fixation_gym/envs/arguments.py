@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from fixation_gym.types import FloatArray
 
 WIDEST = 1.25 * ROBOT.hand.opening
 """Bound of the measured opening between the finger pads, m."""
+FREQUENCIES = (10, 20, 25, 50, 100)
+"""Control steps per second that whole physics steps allow."""
 
 
 def checked_image_size(image_size: Any) -> tuple[int, int] | None:
@@ -31,13 +34,24 @@ def checked_image_size(image_size: Any) -> tuple[int, int] | None:
     return int(sizes[0]), int(sizes[1])
 
 
-def require_choice(name: str, value: str | None, allowed: tuple[str | None, ...]) -> None:
+def checked_frequency(frequency: Any) -> int:
+    """Return a control frequency as a plain integer.
+
+    Raises:
+        ValueError: if it is none of the allowed ones.
+    """
+    if not isinstance(frequency, Real) or frequency not in FREQUENCIES:
+        raise ValueError(f"control_frequency must be 10, 20, 25, 50 or 100 Hz, got {frequency!r}")
+    return int(frequency)
+
+
+def require_choice(name: str, value: Any, allowed: tuple[str | None, ...]) -> None:
     """Check an argument that has a few allowed values.
 
     Raises:
         ValueError: for another value; the message lists the allowed ones.
     """
-    if value not in allowed:
+    if not (value is None or isinstance(value, str)) or value not in allowed:
         raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
 
 
@@ -49,7 +63,8 @@ def checked_action(action: Any, size: int) -> FloatArray:
     """
     values = np.asarray(action, dtype=np.float64)
     if values.shape != (size,) or not np.isfinite(values).all():
-        raise ValueError(f"action must be {size} finite numbers in [-1, 1], got shape {values.shape}: {values}")
+        found = values.ravel()[: size + 1].tolist()
+        raise ValueError(f"action must be {size} finite numbers in [-1, 1], got shape {values.shape}: {found}")
     return np.minimum(np.maximum(values, -1.0), 1.0)  # several times as fast as np.clip on a few numbers
 
 

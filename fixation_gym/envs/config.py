@@ -234,7 +234,7 @@ def resolve_scenario(scenario: str | Mapping[str, Any] | Scenario) -> Scenario:
     values = dict(scenario)
     base = resolve_scenario(values.pop("base", "clear"))
     known = {field.name for field in fields(Scenario)}
-    unknown = sorted(set(values) - known)
+    unknown = [key for key in values if key not in known]
     if unknown:
         raise ValueError(f"unknown scenario fields {unknown}; choose from {sorted(known | {'base'})}")
     # JSON has no tuples: lists come back as the tuples the dataclass holds.

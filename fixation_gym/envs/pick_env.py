@@ -11,7 +11,13 @@ import numpy as np
 from gymnasium import spaces
 
 from fixation_gym.envs import config, rewards, sensors
-from fixation_gym.envs.arguments import checked_action, checked_image_size, observation_space, require_choice
+from fixation_gym.envs.arguments import (
+    checked_action,
+    checked_frequency,
+    checked_image_size,
+    observation_space,
+    require_choice,
+)
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.state import Resumable
@@ -104,8 +110,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self.scenario = config.resolve_scenario(scenario)
         self.noise = config.resolve_sensor_noise(sensor_noise)
         self._image_size = checked_image_size(image_size)
-        if control_frequency not in (10, 20, 25, 50, 100):
-            raise ValueError(f"control_frequency must be 10, 20, 25, 50 or 100 Hz, got {control_frequency!r}")
+        control_frequency = checked_frequency(control_frequency)
         require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
         require_choice("render_view", render_view, RENDER_VIEWS)
         if self._image_size is None and render_view == "overlay":

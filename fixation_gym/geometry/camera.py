@@ -5,15 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from numbers import Integral, Real
 
 import numpy as np
 
 from fixation_gym.types import FloatArray
 
+_LARGEST = 32_767
+"""Longest side of an image that OpenCV remaps, px."""
+
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """Pinhole intrinsics in pixels; pixel (0, 0) is the centre of the top-left pixel."""
+    """Pinhole intrinsics in pixels; pixel (0, 0) is the centre of the top-left pixel.
+
+    Raises:
+        ValueError: for sizes that are not whole numbers, and for values that are not finite.
+    """
 
     width: int
     height: int
@@ -23,14 +31,25 @@ class Intrinsics:
     cy: float
 
     def __post_init__(self) -> None:
-        if self.width <= 0 or self.height <= 0:
-            raise ValueError(f"image size must be positive, got height {self.height} and width {self.width}")
-        if not (self.fx > 0 and self.fy > 0):
-            raise ValueError(f"focal lengths must be positive, got {self.fx} and {self.fy}")
+        sizes = (self.height, self.width)
+        if not all(isinstance(size, Integral) and 0 < size <= _LARGEST for size in sizes):
+            raise ValueError(f"height and width must be whole numbers within 1..{_LARGEST} px, got {sizes}")
+        if not all(isinstance(focal, Real) and 0 < focal < math.inf for focal in (self.fx, self.fy)):
+            raise ValueError(f"focal lengths must be positive and finite, got {self.fx} and {self.fy}")
+        if not all(isinstance(centre, Real) and math.isfinite(centre) for centre in (self.cx, self.cy)):
+            raise ValueError(f"the principal point must be finite, got {self.cx} and {self.cy}")
 
     @classmethod
     def from_fovy(cls, height: int, width: int, fovy_rad: float) -> Intrinsics:
-        """Square pixels, principal point in the image centre, vertical field of view in rad."""
+        """Square pixels, principal point in the image centre, vertical field of view in rad.
+
+        Raises:
+            ValueError: for a field of view that is not between 0 and pi, or a bad size.
+        """
+        if not (isinstance(fovy_rad, Real) and 0.0 < fovy_rad < math.pi):
+            raise ValueError(f"the field of view must be between 0 and pi, got {fovy_rad} rad")
+        if not (isinstance(height, Integral) and isinstance(width, Integral)):
+            raise ValueError(f"height and width must be whole numbers, got {(height, width)}")
         focal = height / (2.0 * math.tan(fovy_rad / 2.0))
         return cls(width, height, focal, focal, (width - 1) / 2.0, (height - 1) / 2.0)
 

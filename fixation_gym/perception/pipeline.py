@@ -136,7 +136,7 @@ class Perception:
             raise ValueError(f"rgb is {found}, but the intrinsics ask for uint8 of shape {expected}")
         pose = np.asarray(observation.camera_pose)
         if pose.shape != (7,) or not all(map(math.isfinite, pose.tolist())) or not any(pose[3:].tolist()):
-            raise ValueError(f"camera_pose must be a finite position and quaternion (w, x, y, z), got {pose}")
+            raise ValueError(f"camera_pose must be a finite position and quaternion (w, x, y, z), got {pose.tolist()}")
         if self._frames and not observation.time > self._frames[-1].time:
             last = self._frames[-1].time
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")

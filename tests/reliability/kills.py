@@ -1,9 +1,9 @@
 """``kill -9`` at random moments: after going on nothing is lost, nothing is there twice, and the result is the same.
 
-Each command runs undisturbed once. Then it begins in a fresh folder, its main process is killed at a moment drawn
-between the first file, or half of the time, and the end of the undisturbed run, the same command goes on, is killed, and so on; what is there
-at the end is compared with the undisturbed result. Every chain of kills is a line of ``chains.jsonl``: the same
-command again goes on.
+Each command runs undisturbed once. Then it begins in a fresh folder, its main process is killed at a random moment
+between the first file, or half of the time, and the end of the undisturbed run, the same command goes on, is killed,
+and so on; what is there at the end is compared with the undisturbed result. Moments are in processor time, which a busy
+machine does not stretch. Every chain of kills is a line of ``chains.jsonl``: the same command again goes on.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import shutil
 import signal
 import sys
 import time
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 import tyro
 from result_folders import content, differences
-from small_commands import COMMANDS, REFERENCES, SOURCE, main
+from small_commands import REFERENCES, SOURCE, main
 
 from fixation_gym.doctor import installed_versions
 from fixation_gym.evaluation.source import source_commit
@@ -45,6 +46,8 @@ KILLS = {
 """50 in all."""
 CHAIN = 4
 """Most kills before a run may end."""
+_LOOK_S = 0.04
+_TICKS = os.sysconf("SC_CLK_TCK")
 ENDS_WITHIN_S = 20.0
 """Within this time after a kill the worker processes of the run are gone, too."""
 
@@ -67,8 +70,6 @@ def load_what_children_share() -> None:
     import stable_baselines3  # noqa: F401
     import torch
 
-    import fixation_gym.envs.pick_sim
-    import fixation_gym.envs.rendering
     import fixation_policies.catalogue  # noqa: F401
 
     torch.set_num_threads(1)
@@ -92,111 +93,146 @@ def start(name: str, folder: Path) -> int:
         os._exit(code)
 
 
-def wait(pid: int, seconds: float) -> int | None:
-    """Exit code of a child; None if it runs on after so many seconds."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        done, status = os.waitpid(pid, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.01)
-    return None
-
-
-def left_in_session(session: int) -> list[int]:
-    """Processes of a session that run."""
-    found = []
+def session_of(leader: int) -> dict[int, float]:
+    """Processes of a session that run, and the processor time that each has used, s."""
+    found = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
-            state, _, _, of = stat.read_text().rpartition(")")[2].split()[:4]
+            values = stat.read_text().rpartition(")")[2].split()
         except OSError:  # it ended meanwhile
             continue
-        if int(of) == session and state != "Z":
-            found.append(int(stat.parent.name))
+        if int(values[3]) == leader and values[0] != "Z":
+            found[int(stat.parent.name)] = (int(values[11]) + int(values[12])) / _TICKS
     return found
 
 
+def ended(pid: int) -> int | None:
+    """Exit code of a child; None if it still runs."""
+    done, status = os.waitpid(pid, os.WNOHANG)
+    return os.waitstatus_to_exitcode(status) if done else None
+
+
 def undisturbed(name: str, folder: Path) -> tuple[float, float]:
-    """Run a command to its end; returns when its first file was there, or half of its time was over, and
-    when it ended, s after the start."""
+    """Run a command to its end.
+
+    Returns:
+        Processor time when its first file was there, or half of all if that is earlier, and all of it, s.
+    """
     shutil.rmtree(folder, ignore_errors=True)
-    began, pid = time.monotonic(), start(name, folder)
-    first, code = None, None
+    pid = start(name, folder)
+    first, used, code = None, 0.0, None
     while code is None:
-        code = wait(pid, 0.02)
+        time.sleep(_LOOK_S)
+        used = max(used, sum(session_of(pid).values()))
         if first is None and folder.exists() and any(folder.iterdir()):
-            first = time.monotonic() - began
+            first = used
+        code = ended(pid)
     if code != 0:
         raise SystemExit(f"{name} ends with {code} without being disturbed; see {folder.with_suffix('.log')}")
-    took = time.monotonic() - began
-    return min(first or 0.0, 0.5 * took), took  # some commands write everything at their end
+    return min(first or 0.0, 0.5 * used), used
+
+
+def disturbed(name: str, folder: Path, moment: float) -> tuple[int | None, dict[str, Any]]:
+    """Run a command, or go on with it, and kill its main process after so much processor time.
+
+    Returns:
+        Its exit code, None if it was killed, and what was there then.
+    """
+    pid, code = start(name, folder), None
+    while code is None and sum(session_of(pid).values()) < moment:
+        time.sleep(_LOOK_S)
+        code = ended(pid)
+    if code is not None:
+        return code, {}
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    files = sum(path.is_file() for path in folder.rglob("*"))
+    end = time.monotonic() + ENDS_WITHIN_S
+    while (left := len(session_of(pid))) and time.monotonic() < end:
+        time.sleep(_LOOK_S)
+    return None, {"cpu_s": round(moment, 2), "files": files, "processes_left": left}
 
 
 def chain(name: str, times: tuple[float, float], folder: Path, rng: np.random.Generator, most: int) -> dict[str, Any]:
-    """Kill a command up to ``most`` times, let it end, and say how its folder differs from that of ``reference``."""
+    """Kill a command up to ``most`` times, and let it end."""
     shutil.rmtree(folder, ignore_errors=True)
     kills: list[dict[str, Any]] = []
-    stayed = 0
     code = None
-    while code is None and len(kills) < most:
-        pid = start(name, folder)
-        moment = float(rng.uniform(*times))
-        code = wait(pid, moment)
-        if code is None:
-            os.kill(pid, signal.SIGKILL)
-            os.waitpid(pid, 0)
-            kills.append({"s": round(moment, 2), "files": sum(path.is_file() for path in folder.rglob("*"))})
-            end = time.monotonic() + ENDS_WITHIN_S
-            while left_in_session(pid) and time.monotonic() < end:
-                time.sleep(0.05)
-            stayed += len(left_in_session(pid))
-    if code is None:
-        code = wait(start(name, folder), 3600.0)
-    return {"kills": kills, "exit_code": code, "processes_left": stayed}
+    while code is None:
+        moment = float(rng.uniform(*times)) if len(kills) < most else np.inf
+        code, kill = disturbed(name, folder, moment)
+        kills += [kill] if kill else []
+    return {"command": name, "kills": kills, "exit_code": code}
 
 
-def check(name: str, args: Args, store: ResultStore[tuple[str, int], dict[str, Any]]) -> None:
-    """Kill a command as often as the table says."""
-    reference = args.out / REFERENCES.get(name, name)
-    done = [row for (command, _), row in store.finished.items() if command == name]
-    left = KILLS[name] - sum(len(row["kills"]) for row in done)
-    if left <= 0:
-        return
-    times = undisturbed(REFERENCES.get(name, name), reference)
-    if name == "evaluate":
-        shutil.rmtree(args.out / SOURCE, ignore_errors=True)
-        shutil.copytree(reference, args.out / SOURCE)
-    while left > 0:
-        number = len(done)
-        rng = np.random.default_rng([args.seed, list(KILLS).index(name), number])
-        folder = args.out / f"{name}-{number}"
-        row = chain(name, times, folder, rng, min(CHAIN, left))
-        row |= {"command": name, "chain": number, "differences": differences(content(reference), content(folder))}
-        store.append(row)
-        done.append(row)
-        left -= len(row["kills"])
-        print(f"{name}: {len(row['kills'])} kills, exit code {row['exit_code']}, {row['differences'] or 'the same'}")
+class Reference:
+    """The undisturbed run of each command, when it is first asked for."""
+
+    def __init__(self, out: Path) -> None:
+        self._out = out
+        self._times: dict[str, tuple[float, float]] = {}
+
+    def of(self, name: str) -> tuple[Path, tuple[float, float]]:
+        """Folder, and times as ``undisturbed`` gives them."""
+        folder = self._out / REFERENCES.get(name, name)
+        if name not in self._times:
+            self._times[name] = undisturbed(name, self._out / name)
+        if not folder.exists():
+            undisturbed(folder.name, folder)
+        source = self._out / SOURCE
+        if name == "evaluate" and not source.exists():
+            shutil.copytree(folder, source)
+        return folder, self._times[name]
+
+
+def left(name: str, rows: Iterable[dict[str, Any]]) -> int:
+    """How many kills a command lacks."""
+    return KILLS[name] - sum(len(row["kills"]) for row in rows if row["command"] == name)
+
+
+def kill_all(args: Args, store: ResultStore[tuple[str, int], dict[str, Any]]) -> None:
+    """Round by round, a chain of every command that lacks kills."""
+    reference = Reference(args.out)
+    while missing := [name for name in args.only if left(name, store.finished.values()) > 0]:
+        for name in missing:
+            number = sum(command == name for command, _ in store.finished)
+            whole, times = reference.of(name)
+            rng = np.random.default_rng([args.seed, list(KILLS).index(name), number])
+            most = min(CHAIN, left(name, store.finished.values()))
+            row = {"chain": number, **chain(name, times, args.out / f"{name}-{number}", rng, most)}
+            row["differences"] = differences(content(whole), content(args.out / f"{name}-{number}"))
+            store.append(row)
+            print(
+                f"{name}: {len(row['kills'])} kills, ends with {row['exit_code']}, {row['differences'] or 'the same'}"
+            )
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Rows as Markdown."""
+    lines = ["| command | kills | of these with files in the folder | runs | differences | processes left |"]
+    lines.append("|---|---|---|---|---|---|")
+    for name in KILLS:
+        mine = [row for row in rows if row["command"] == name and row["kills"]]
+        kills = [kill for row in mine for kill in row["kills"]]
+        files, left_over = sum(kill["files"] > 0 for kill in kills), sum(kill["processes_left"] for kill in kills)
+        differing = sum(len(row["differences"]) + (row["exit_code"] != 0) for row in mine)
+        lines.append(f"| `{name}` | {len(kills)} | {files} | {len(mine)} | {differing} | {left_over} |")
+    return "\n".join(lines)
 
 
 def run(args: Args) -> int:
     """Kill, compare and print the table; exit code 1 if anything differs."""
     load_what_children_share()
     described = {"seed": args.seed, "commit": source_commit(), "versions": installed_versions()}
-    args.out.mkdir(parents=True, exist_ok=True)
     with ResultStore(
         args.out, described, "chains.jsonl", lambda row: (row["command"], row["chain"]), dict, dict
     ) as store:
-        for name in args.only:
-            check(name, args, store)
+        kill_all(args, store)
         rows = list(store.finished.values())
-    bad = [row for row in rows if row["exit_code"] or row["differences"] or row["processes_left"]]
-    print("\n| command | kills | ends | differences | processes left |\n|---|---|---|---|---|")
-    for name in COMMANDS:
-        mine = [row for row in rows if row["command"] == name]
-        if mine:
-            counts = (sum(len(row["kills"]) for row in mine), len(mine), sum(len(row["differences"]) for row in mine))
-            print(f"| `{name}` | {' | '.join(map(str, counts))} | {sum(row['processes_left'] for row in mine)} |")
-    print(f"\n{sum(len(row['kills']) for row in rows)} kills, {len(bad)} chains that did not end as they should")
+    print(f"\n{table(rows)}\n")
+    bad = [row for row in rows if row["exit_code"] or row["differences"]]
+    bad += [row for row in rows if any(kill["processes_left"] for kill in row["kills"])]
+    print(f"{sum(len(row['kills']) for row in rows)} kills, {len(bad)} runs that did not end as they should")
     return 1 if bad else 0
 
 

@@ -97,7 +97,10 @@ def _read(path: Path) -> tuple[AgentCard, bytes]:
     except (TypeError, KeyError) as error:
         raise _damaged(path) from error
     numbers = (*card.image_size, card.seed, card.decisions, card.env_steps)
-    if len(card.image_size) != 2 or not all(isinstance(number, int) for number in numbers):
+    texts = (card.scenario, *card.versions, *card.versions.values()) if isinstance(card.versions, dict) else (None,)
+    if not all(isinstance(number, int) for number in numbers) or not all(isinstance(text, str) for text in texts):
+        raise _damaged(path)
+    if len(card.image_size) != 2:
         raise _damaged(path)
     if card.format != FORMAT or not known:
         raise UsageError(f"{path} is an agent of another version (format {card.format}, here {FORMAT}); train it again")

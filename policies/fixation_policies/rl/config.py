@@ -93,7 +93,7 @@ class TrainConfig:
             raise UsageError(
                 f"--steps must be above {random_steps}, since SAC learns after so many random ones, got {self.steps}"
             )
-        if self.checkpoint_minutes <= 0.0:
+        if not self.checkpoint_minutes > 0.0:
             raise UsageError(f"--checkpoint-minutes must be above 0, got {self.checkpoint_minutes}")
         require_learning_packages()
 
