@@ -8,15 +8,12 @@ import zipfile
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fixation_gym import cli
 from fixation_gym.envs.config import Scenario, resolve_scenario
-from fixation_gym.envs.object_pool import MAX_OBSTACLES
-from fixation_gym.envs.obstacle_kinds import KIND_NAMES, MATERIALS
 from fixation_gym.envs.pick_env import FixationPickEnv
-from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.zfc_env import FixationPickZFC
 from fixation_gym.errors import UsageError
 from fixation_gym.geometry.camera import Intrinsics
@@ -85,41 +82,6 @@ def test_fields_of_scenarios(values):
 def test_arguments_of_environments(make, values):
     env = works_or_says(ValueError, lambda: make(**values))
     assert env is None or env.observation_space.contains(env.observation_space.sample())
-
-
-@st.composite
-def recipes(draw):
-    """Scenarios that are allowed, whatever their fields ask for together."""
-
-    def within(low, high):
-        return sorted(draw(st.tuples(st.floats(low, high), st.floats(low, high))))
-
-    def some(names, least=0):
-        return draw(st.lists(st.sampled_from(names), min_size=least, unique=True))
-
-    still = sorted(draw(st.tuples(st.integers(1, 6), st.integers(1, 6))))
-    values = {
-        "obstacle_count": still,
-        "moving_count": [0, draw(st.integers(0, 3))],
-        "obstacle_kinds": some(KIND_NAMES, 1),
-        "first_kinds": some(KIND_NAMES),
-        "obstacle_materials": ["opaque", *some([name for name in MATERIALS if name != "opaque"])],
-        "free_elevation_deg": within(*resolve_scenario("clear").free_elevation_deg),
-        "view_elevation_deg": within(30.0, 60.0),
-        "grasp_width": within(*resolve_scenario("clear").grasp_width),
-        "target_moves": draw(st.floats(0, 1)),
-        "distractor": draw(st.floats(0, 1)),
-    }
-    flags = ("through_sight", "discovery", "coloured_frames", "any_colour")
-    return {**values, **{name: draw(st.booleans()) for name in flags}}
-
-
-@settings(max_examples=6, phases=[Phase.generate])
-@given(values=recipes(), seed=st.integers(0, 2**32))
-def test_recipes_that_are_allowed_give_scenes_in_the_end(values, seed):
-    scenario = resolve_scenario(values)
-    scene = works_or_says(RuntimeError, lambda: sample_scene(scenario, np.random.default_rng(seed)))
-    assert scene is None or len(scene.obstacles) <= MAX_OBSTACLES
 
 
 COMMANDS = {

@@ -75,13 +75,13 @@ def load_what_children_share() -> None:
     torch.set_num_threads(1)
 
 
-def start(name: str, folder: Path) -> int:
-    """Run a command in a forked process, in a session of its own; returns its id."""
+def start(name: str, folder: Path, log_file: Path | None = None) -> int:
+    """Run a command in a forked process, in a session of its own; returns its id. What it says is beside its folder."""
     pid = os.fork()
     if pid:
         return pid
     os.setsid()
-    log = os.open(folder.with_suffix(".log"), os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    log = os.open(log_file or folder.with_suffix(".log"), os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(log, 1)
     os.dup2(log, 2)
     code = 1
