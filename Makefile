@@ -4,7 +4,7 @@
 VENV := .venv/bin
 ARGS :=
 
-.PHONY: demo test test-core test-newest lint evaluate golden bench doctor core full lock clean
+.PHONY: demo test test-core test-newest lint evaluate golden bench soak kills full_disk doctor core full lock clean
 
 demo: core
 	$(VENV)/fixation-gym demo $(ARGS)
@@ -39,6 +39,10 @@ golden: core
 bench: core  # with the peers it compares to
 	$(VENV)/uv pip install --quiet --constraint constraints.txt --editable '.[bench]'
 	$(VENV)/fixation-gym bench $(ARGS)
+
+# What docs/reliability.md reports: random actions, kill -9 of every command, a disk that gets full (as root).
+soak kills full_disk: full
+	$(VENV)/python tests/reliability/$@.py --out out/$@ $(ARGS)
 
 doctor: core
 	$(VENV)/fixation-gym doctor

@@ -33,7 +33,7 @@ class Intrinsics:
     def __post_init__(self) -> None:
         sizes = (self.height, self.width)
         if not all(isinstance(size, Integral) and 0 < size <= _LARGEST for size in sizes):
-            raise ValueError(f"height and width must be whole numbers within 1..{_LARGEST} px, got {sizes}")
+            raise ValueError(f"height and width must be positive whole numbers up to {_LARGEST} px, got {sizes}")
         if not all(isinstance(focal, Real) and 0 < focal < math.inf for focal in (self.fx, self.fy)):
             raise ValueError(f"focal lengths must be positive and finite, got {self.fx} and {self.fy}")
         if not all(isinstance(centre, Real) and math.isfinite(centre) for centre in (self.cx, self.cy)):
