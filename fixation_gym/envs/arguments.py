@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -40,7 +39,7 @@ def checked_frequency(frequency: Any) -> int:
     Raises:
         ValueError: if it is none of the allowed ones.
     """
-    if not isinstance(frequency, Real) or frequency not in FREQUENCIES:
+    if not isinstance(frequency, (int, float, np.number)) or frequency not in FREQUENCIES:
         raise ValueError(f"control_frequency must be 10, 20, 25, 50 or 100 Hz, got {frequency!r}")
     return int(frequency)
 

@@ -10,14 +10,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from fixation_gym.envs import config, rewards, sensors
-from fixation_gym.envs.arguments import (
-    checked_action,
-    checked_frequency,
-    checked_image_size,
-    observation_space,
-    require_choice,
-)
+from fixation_gym.envs import arguments, config, rewards, sensors
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.state import Resumable
@@ -109,10 +102,10 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         """
         self.scenario = config.resolve_scenario(scenario)
         self.noise = config.resolve_sensor_noise(sensor_noise)
-        self._image_size = checked_image_size(image_size)
-        control_frequency = checked_frequency(control_frequency)
-        require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
-        require_choice("render_view", render_view, RENDER_VIEWS)
+        self._image_size = arguments.checked_image_size(image_size)
+        control_frequency = arguments.checked_frequency(control_frequency)
+        arguments.require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
+        arguments.require_choice("render_view", render_view, RENDER_VIEWS)
         if self._image_size is None and render_view == "overlay":
             raise ValueError('render_view="overlay" shows what perception sees, so it needs an image_size')
         self.render_mode, self.render_view = render_mode, render_view
@@ -129,7 +122,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self.control_frequency = control_frequency
         self._reward_terms = rewards.choose_terms(reward, reward_weights)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
-        self.observation_space = observation_space(self._image_size)
+        self.observation_space = arguments.observation_space(self._image_size)
         boxes = ((key, box) for key, box in self.observation_space.items() if isinstance(box, spaces.Box))
         self._limits = {key: (box.low, box.high) for key, box in boxes}
         self._running = False
@@ -174,7 +167,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             ValueError: if the action has the wrong shape or holds NaN or infinity.
             gymnasium.error.ResetNeeded: before the first reset, and after ``close``.
         """
-        action = checked_action(action, 7)
+        action = arguments.checked_action(action, 7)
         self._require_reset()
         sim = self.sim
         latency = round(self.noise.image_latency_s / sim.model.opt.timestep)

@@ -21,8 +21,8 @@ from fixation_gym.envs.config import SCENARIO_NAMES
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.source import source_commit
-from fixation_gym.evaluation.workers import prepare_process
-from fixation_gym.experiments.runner import Cell, Experiment, kept_rig
+from fixation_gym.evaluation.workers import kept, prepare_process
+from fixation_gym.experiments.runner import Cell, Experiment
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.names import Names
 
@@ -102,7 +102,7 @@ class Soaked:
 
 def run_piece(cell: Cell) -> dict[str, Any]:
     """Run the episodes of a piece; returns the cell with its steps, faults and resident memory after each episode."""
-    soaked = kept_rig(Soaked, cell["environment"], cell["scenario"], tuple(cell["image_size"]))
+    soaked = kept(Soaked, cell["environment"], cell["scenario"], tuple(cell["image_size"]), close=Soaked.close)
     rng = np.random.default_rng([cell["seed"], SCENARIO_NAMES.index(cell["scenario"]), cell["index"]])
     lengths = episode_lengths(cell["resets"], cell["mean_steps"], rng)
     steps, faults, rss_mb = 0, set(), []
