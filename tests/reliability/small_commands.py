@@ -59,8 +59,7 @@ def report(out: Path) -> int:
 
 
 def ablate(out: Path) -> int:
-    variants, scenarios = ("blind",), ("clear",)
-    return report_commands.Ablate(variants, scenarios, episodes=1, image_size=SMALL, out=out).run()
+    return report_commands.Ablate(variant=("blind",), scenarios=("clear",), episodes=1, image_size=SMALL, out=out).run()
 
 
 def ladder(out: Path) -> int:
@@ -88,11 +87,11 @@ def compare(out: Path) -> int:
 
 def distance(out: Path) -> int:
     distance_config.QUICK_DISTANCES = (0.15,)
-    return cli.Distance(quick=True, seeds=1, out=out).run()
+    return cli.Distance(quick=True, count=1, out=out).run()
 
 
 def scenarios(out: Path) -> int:
-    return cli.Scenarios(quick=True, instances=1, out=out).run()
+    return cli.Scenarios(quick=True, count=1, out=out).run()
 
 
 def necessity(out: Path) -> int:
