@@ -137,3 +137,30 @@ def test_while_the_distance_is_hardly_known_only_what_is_far_off_it_is_decided()
     assert shares[0.2][0] > 0.8 * shares[0.02][0] > 0.2
     assert shares[0.2][1] < 0.2 < shares[0.02][1]
     assert max(shares[0.6]) < 0.1
+
+
+def spread_over(front: np.ndarray, behind: np.ndarray) -> SimpleNamespace:
+    """A test's answers, sure of both sides, nothing moves by itself."""
+    p = np.full(front.shape, 0.5, np.float32)
+    p[front], p[behind] = 1.0, 0.0
+    return SimpleNamespace(p_nearer=p, moving=np.zeros(front.shape, np.bool_))
+
+
+def test_what_an_outline_spreads_over_its_neighbour_is_no_vote_about_the_neighbour():
+    left, right = np.zeros((2, 30, 40), np.bool_)
+    left[:, 8:20], right[:, 20:30] = True, True  # something plain and far, hidden in part by something near
+    front, behind = np.zeros((2, 30, 40), np.bool_)
+    front[:, 18:30], behind[:, 8:12] = True, True  # the near one's outline reaches 2 px into the far one
+    answers = spread_over(front, behind)
+    far, near = (region_votes(answers, region, VoteSettings()) for region in (left, right))  # pyright: ignore
+    assert far == (0.0, 120.0)
+    assert decide(*far, VoteSettings()) is Side.BEHIND
+    assert decide(*near, VoteSettings()) is Side.FRONT
+
+
+def test_something_near_beside_something_near_is_still_in_front():
+    left, right = np.zeros((2, 30, 40), np.bool_)
+    left[:, 8:20], right[:, 20:30] = True, True
+    answers = spread_over(left | right, np.zeros((30, 40), np.bool_))
+    for region in (left, right):
+        assert decide(*region_votes(answers, region, VoteSettings()), VoteSettings()) is Side.FRONT  # pyright: ignore
