@@ -12,7 +12,8 @@ from fixation_gym.evaluation.config import EvaluationConfig, episode_seeds
 if TYPE_CHECKING:
     from fixation_gym.evaluation.rollout import EpisodeKey
 
-FORMATS = ("lerobot",)
+FORMATS = {"lerobot": ("pyarrow", "pandas"), "minari": ("pyarrow", "minari")}
+"""Data sets that can be written, and the packages that each needs."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class ExportConfig(EvaluationConfig):
     """Which episodes to record, and for whom."""
 
     format: str = "lerobot"
-    """lerobot: a data set of LeRobot, version 3.0."""
+    """lerobot: a data set of LeRobot, version 3.0; minari: one of Minari. A folder may hold both, recorded once."""
 
     def check(self) -> None:
         """Check everything that can be checked without building an environment.
@@ -31,12 +32,14 @@ class ExportConfig(EvaluationConfig):
         super().check()
         if self.format not in FORMATS:
             raise UsageError(f"unknown format '{self.format}'; choose one of {', '.join(FORMATS)}")
-        if any(importlib.util.find_spec(name) is None for name in ("pyarrow", "pandas")):
-            raise UsageError("export needs pyarrow and pandas: pip install 'fixation-gym[export]'")
+        packages = FORMATS[self.format]
+        if any(importlib.util.find_spec(name) is None for name in packages):
+            needs = " and ".join(packages)
+            raise UsageError(f"--format {self.format} needs {needs}: pip install 'fixation-gym[export]'")
 
     def run_description(self) -> dict[str, Any]:
-        """Everything the result of one episode depends on; the scenarios, too, for they number the episodes."""
-        return {**super().run_description(), "format": self.format, "scenarios": list(self.scenarios)}
+        """Everything a recording depends on, so not the format; the scenarios, too, for they number the episodes."""
+        return {**super().run_description(), "scenarios": list(self.scenarios)}
 
     def episode_keys(self) -> list[EpisodeKey]:
         """(scenario, seed) of every episode in the order of their numbers: more episodes come after those before."""

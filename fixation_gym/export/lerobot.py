@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from fixation_gym.envs.config import CONTROL_FREQUENCY
 from fixation_gym.evaluation.files import write_file, write_json
-from fixation_gym.export.recording import FLAGS, NAMES, VIDEOS, Recorded, numbers_file
+from fixation_gym.export.config import ExportConfig
+from fixation_gym.export.recording import CHUNK_SIZE, FLAGS, NAMES, VIDEOS, Recorded, read_numbers
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
-CHUNK_SIZE = 1000
-"""Files in a folder."""
 _VERSION = "v3.0"
 _TASK = "pick up the object in the box of the first picture"
 _DATA_FILE, _EPISODES_FILE = "data/chunk-000/file-000.parquet", "meta/episodes/chunk-000/file-000.parquet"
@@ -27,18 +27,18 @@ _COUNTERS = {"timestamp": "float32", "frame_index": "int64", "episode_index": "i
 _COUNTERS |= {"task_index": "int64"}
 
 
-def write_dataset(folder: Path, episodes: Sequence[Recorded], fps: int, image_size: tuple[int, int]) -> None:
+def write_dataset(folder: Path, episodes: Sequence[Recorded], config: ExportConfig) -> None:
     """Write numbers, features, statistics and the list of episodes beside the videos that are there.
 
     Args:
         folder: with the recordings.
         episodes: in the order of their numbers.
-        fps: decisions per second.
-        image_size: (height, width) of the wrist picture, px.
+        config: that they were recorded with.
     """
-    recorded = [_read(folder, episode.index) for episode in episodes]
+    fps = CONTROL_FREQUENCY
+    recorded = [_features_of(folder, episode.index) for episode in episodes]
     columns = {name: np.concatenate([part[name] for part in recorded]) for name in recorded[0] if ":" not in name}
-    features = _features(columns, fps, image_size)
+    features = _features(columns, fps, config.surroundings.image_size)
     stats = {name: _statistics(values) for name, values in columns.items() if name not in FLAGS}
     for video in VIDEOS:
         stats[video] = _picture_statistics(np.array([part[f"sums:{video}"] for part in recorded]))
@@ -66,9 +66,9 @@ def write_dataset(folder: Path, episodes: Sequence[Recorded], fps: int, image_si
     write_json(folder / "meta" / "info.json", info)  # last: a reader begins with it
 
 
-def _read(folder: Path, index: int) -> dict[str, FloatArray]:
-    with np.load(numbers_file(folder, index)) as file:
-        return dict(file)
+def _features_of(folder: Path, index: int) -> dict[str, FloatArray]:
+    """What is a feature of the recording, and the sums of its pictures; the rest takes memory that is not needed."""
+    return {name: values for name, values in read_numbers(folder, index).items() if not name.startswith("env:")}
 
 
 def _features(columns: dict[str, FloatArray], fps: int, image_size: tuple[int, int]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""One episode as a recording: numbers in a file, pictures and maps as videos."""
+"""One episode as a recording: numbers in a file, pictures and maps as videos. Every format is written from it."""
 
 from __future__ import annotations
 
@@ -35,6 +35,12 @@ NAMES: dict[str, tuple[str, ...]] = {
 }
 """What the numbers of each feature are; the action's depend on the policy."""
 FLAGS = ("next.success", "next.collision", "next.done")
+CELLS_KEY, TERMINATED_KEY, LAST_IMAGE_KEY = "env:cells", "env:terminated", "env:last_image"
+"""Maps of all decisions, whether the task ended, and the picture after the last decision."""
+OBSERVED = "env:observation:"
+"""Before the keys of the environment's own observation, but for its picture: of all decisions and after the last."""
+CHUNK_SIZE = 1000
+"""Videos in a folder."""
 _CRF = 18
 """Quality of the videos; 0 would be without loss, 23 is what films have."""
 
@@ -56,49 +62,79 @@ class Recorded:
         return self.scenario, self.seed
 
 
+@dataclass(frozen=True)
+class _Decision:
+    """What a policy had, did and got."""
+
+    row: dict[str, Any]
+    image: ImageArray
+    cells: ImageArray
+    observation: dict[str, Any]
+    """The environment's own, without its picture."""
+    following: dict[str, Any]
+    following_image: ImageArray
+    terminated: bool
+
+
 def numbers_file(folder: Path, index: int) -> Path:
     """Where the numbers of an episode are."""
     return folder / "recorded" / f"episode-{index:06d}.npz"
 
 
-def video_file(folder: Path, video: str, index: int, chunk_size: int) -> Path:
+def read_numbers(folder: Path, index: int) -> dict[str, FloatArray]:
+    """All numbers of an episode; names with a colon are not features of LeRobot."""
+    with np.load(numbers_file(folder, index)) as file:
+        return dict(file)
+
+
+def video_file(folder: Path, video: str, index: int) -> Path:
     """Where a video of an episode is, as LeRobot looks for it."""
-    return folder / "videos" / video / f"chunk-{index // chunk_size:03d}" / f"file-{index % chunk_size:03d}.mp4"
+    return folder / "videos" / video / f"chunk-{index // CHUNK_SIZE:03d}" / f"file-{index % CHUNK_SIZE:03d}.mp4"
 
 
-def record(cell: Mapping[str, Any], folder: Path, index: int, chunk_size: int, fps: int) -> Recorded:
+def record(cell: Mapping[str, Any], folder: Path, index: int, fps: int) -> Recorded:
     """Run the episode that a cell describes, and keep it. Files have their names only once they are whole."""
-    paths = [video_file(folder, name, index, chunk_size) for name in VIDEOS]
+    paths = [video_file(folder, name, index) for name in VIDEOS]
     for path in (*paths, numbers_file(folder, index)):
         path.parent.mkdir(parents=True, exist_ok=True)
-    rows, sums = [], {name: _ChannelSums() for name in VIDEOS}
+    rows, observations, cells = [], [], []
+    sums = {name: _ChannelSums() for name in VIDEOS}
     with VideoWriter(paths[0], fps, _CRF) as wrist, VideoWriter(paths[1], fps, _CRF) as maps:
-        for row, image, cells in _steps(cell):
-            shown = cv2.cvtColor(cells, cv2.COLOR_GRAY2RGB)
-            wrist.add(image)
-            maps.add(np.asarray(shown, np.uint8))
-            sums[WRIST].add(image)
-            sums[MAP].add(np.asarray(shown, np.uint8))
-            rows.append(row)
-    columns = {name: np.array([row[name] for row in rows], np.float32) for name in rows[0]}
-    moments = {f"sums:{name}": sums[name].moments() for name in VIDEOS}
+        for decision in _decisions(cell):
+            shown = np.asarray(cv2.cvtColor(decision.cells, cv2.COLOR_GRAY2RGB), np.uint8)
+            wrist.add(decision.image)
+            maps.add(shown)
+            sums[WRIST].add(decision.image)
+            sums[MAP].add(shown)
+            rows.append(decision.row)
+            observations.append(decision.observation)
+            cells.append(decision.cells)
+    observations.append(decision.following)
+    numbers = {
+        **{name: np.array([row[name] for row in rows], np.float32) for name in rows[0]},
+        **{OBSERVED + key: np.array([seen[key] for seen in observations]) for key in observations[0]},
+        **{f"sums:{name}": sums[name].moments() for name in VIDEOS},
+        CELLS_KEY: np.array(cells),
+        TERMINATED_KEY: np.array(decision.terminated),
+        LAST_IMAGE_KEY: decision.following_image,
+    }
     packed = io.BytesIO()
-    np.savez_compressed(packed, **columns, **moments)  # pyright: ignore[reportArgumentType]
+    np.savez_compressed(packed, **numbers)  # pyright: ignore[reportArgumentType]
     write_file(numbers_file(folder, index), packed.getvalue())
     last = rows[-1]
     success, collision = bool(last["next.success"][0]), bool(last["next.collision"][0])
     return Recorded(index, cell["scenario"], cell["seed"], len(rows), success, collision)
 
 
-def _steps(cell: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], ImageArray, ImageArray]]:
-    """Every decision of an episode: its numbers, the picture and the map that the policy had."""
+def _decisions(cell: Mapping[str, Any]) -> Iterator[_Decision]:
+    """Every decision of an episode."""
     env, policy = workers.world(dict(cell))
     base: Any = env.unwrapped
     obs, _ = env.reset(seed=cell["seed"])
     policy.reset(cell["seed"])
     done = False
     while not done:
-        sensed = base.sensed
+        sensed, seen = base.sensed, _without_picture(obs)
         action = policy.act(obs)
         percept: Percept | None = getattr(policy, "percept", None) or base.percept
         row = {
@@ -117,7 +153,13 @@ def _steps(cell: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], ImageArray
             "next.collision": [info["collision"]],
             "next.done": [done],
         }
-        yield row, sensed["rgb"], cells
+        following, following_image = _without_picture(obs), base.sensed["rgb"]
+        yield _Decision(row, sensed["rgb"], cells, seen, following, following_image, bool(terminated))
+
+
+def _without_picture(observation: Mapping[str, Any]) -> dict[str, Any]:
+    """Pictures are kept as video."""
+    return {key: value for key, value in observation.items() if key != "rgb"}
 
 
 class _ChannelSums:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,6 @@ from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import EPISODES_FILE, SUMMARY_FILE, ResultStore
 from fixation_gym.export.config import ExportConfig
-from fixation_gym.export.lerobot import CHUNK_SIZE, write_dataset
 from fixation_gym.export.recording import Recorded, record
 
 
@@ -47,7 +47,7 @@ def export(config: ExportConfig, out: Path) -> dict[str, Any]:
         )
         workers.close_kept()
         episodes = [store.finished[key] for key in keys]
-        write_dataset(out, episodes, CONTROL_FREQUENCY, config.surroundings.image_size)
+        _writer(config.format)(out, episodes, config)
         summary = {
             "policy": config.policy,
             "format": config.format,
@@ -67,7 +67,18 @@ def export(config: ExportConfig, out: Path) -> dict[str, Any]:
 def _run(out: Path, cell: workers.Cell) -> dict[str, Any]:
     """Record one episode, in a worker process if there are several."""
     place = {name: value for name, value in cell.items() if name != "index"}
-    return asdict(record(place, out, cell["index"], CHUNK_SIZE, CONTROL_FREQUENCY))
+    return asdict(record(place, out, cell["index"], CONTROL_FREQUENCY))
+
+
+def _writer(format_name: str) -> Callable[[Path, Sequence[Recorded], ExportConfig], None]:
+    """What writes a data set of that format from the recordings in a folder; their libraries are extras."""
+    if format_name == "minari":
+        from fixation_gym.export import minari
+
+        return minari.write_dataset
+    from fixation_gym.export import lerobot
+
+    return lerobot.write_dataset
 
 
 def _key(episode: Recorded) -> tuple[str, int]:

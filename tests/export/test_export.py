@@ -2,17 +2,20 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
 
+import fixation_policies
 from fixation_gym.errors import UsageError
 from fixation_gym.export.config import ExportConfig
 from fixation_gym.export.recording import NAMES, VIDEOS
 
 pd = pytest.importorskip("pandas")
 SMALL = (64, 80)
+AGENT = next((Path(fixation_policies.__file__).parent / "agents").glob("zfc*.zip"))
 CONFIG = ExportConfig(policy="servo", scenarios=("clear",), episodes=2, image_size=SMALL)
 
 
@@ -102,6 +105,70 @@ def test_more_episodes_come_after_those_that_are_there(dataset):
     assert summary["episodes_resumed"] == 2
     pd.testing.assert_frame_equal(after.iloc[: len(before)], before)
     assert set(after.episode_index) == {0, 1, 2}
+
+
+def assert_holds_what_the_policy_met(episode, env, policy, pictures):
+    """Run the episode again and compare; pictures went through a video and JPEG."""
+    seed = int(episode.id)  # episode i of seed 0
+    obs, _ = env.reset(seed=seed)
+    policy.reset(seed)
+    for step in range(len(episode) + 1):
+        for key, values in episode.observations.items():
+            if key == "rgb":
+                assert np.abs(values[step].astype(float) - obs[key]).mean() < 8.0
+            else:
+                np.testing.assert_array_equal(values[step], obs[key])
+        assert ("rgb" in episode.observations) == pictures
+        if step < len(episode):
+            action = policy.act(obs)
+            np.testing.assert_array_equal(episode.actions[step], action)
+            percept = getattr(policy, "percept", None) or env.unwrapped.percept
+            np.testing.assert_array_equal(episode.infos["zero_flow_map"][step], percept.zfc.cells)
+            obs, reward, *_ = env.step(action)
+            assert episode.rewards[step] == pytest.approx(reward)
+
+
+@pytest.mark.sim
+def test_minari_gets_the_same_recordings_bit_by_bit_but_for_pictures(dataset, monkeypatch):
+    import minari
+
+    from fixation_gym.export.run import export
+    from fixation_policies.catalogue import make_policy
+
+    summary = export(dataclasses.replace(CONFIG, format="minari"), dataset)
+    assert summary["episodes_resumed"] == 2
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(dataset / "minari"))
+    picks = minari.load_dataset("fixation/pick-v0")
+    assert (picks.total_episodes, picks.total_steps) == (2, 24)
+    assert [meta["seed"] for meta in picks.storage.get_episode_metadata([0, 1])] == [0, 1]
+    assert [meta["scenario"] for meta in picks.storage.get_episode_metadata([0, 1])] == ["clear"] * 2
+    env = picks.recover_environment(max_episode_steps=12)
+    assert env.observation_space == picks.observation_space
+    policy = make_policy("servo", env)
+    for episode in picks.iterate_episodes():
+        assert episode.truncations.tolist() == [False] * 11 + [True]
+        assert not episode.terminations.any()
+        assert_holds_what_the_policy_met(episode, env, policy, pictures=True)
+    env.close()
+
+
+@pytest.mark.sim
+def test_minari_gets_what_an_agent_sees_in_the_environment_for_learners(tmp_path, monkeypatch):
+    import gymnasium as gym
+    import minari
+
+    from fixation_gym.export.run import export
+    from fixation_policies.catalogue import make_policy
+
+    monkeypatch.setattr(gym.spec("FixationPickZFC-v0"), "max_episode_steps", 6)
+    config = dataclasses.replace(CONFIG, policy=str(AGENT), episodes=1, format="minari")
+    export(config, tmp_path / "set")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "set" / "minari"))
+    episode = minari.load_dataset("fixation/pick-v0")[0]
+    env = minari.load_dataset("fixation/pick-v0").recover_environment()
+    assert episode.actions.shape == (6, 4)
+    assert_holds_what_the_policy_met(episode, env, make_policy(str(AGENT), env), pictures=False)
+    env.close()
 
 
 @pytest.mark.parametrize(
