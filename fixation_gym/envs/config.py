@@ -14,6 +14,8 @@ from fixation_gym.robots import ROBOT
 CONTROL_FREQUENCY = 25
 """Control steps per second."""
 EPISODE_SECONDS = 25.0
+TASK = "pick up the object in the box of the first picture"
+"""What the robot is to do, for policies that read."""
 IMAGE_SIZE = (240, 320)
 """Default (height, width) of the wrist image, px."""
 LIFT_HEIGHT = 0.10

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from fixation_gym.control.open_loop import OpenLoopGains
 from fixation_gym.envs.arguments import checked_action, require_choice
 from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE
+from fixation_gym.envs.perceiving import perception_for
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.rewards import RewardWeights
 from fixation_gym.envs.zfc_observation import (
@@ -21,8 +22,6 @@ from fixation_gym.envs.zfc_observation import (
     zfc_observation_space,
 )
 from fixation_gym.fixator import Fixator, FixatorGains, action_of
-from fixation_gym.perception.detection.box_tracker import BoxTracker
-from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import Observation
 
@@ -123,9 +122,7 @@ class FixationPickZFC(FixationPickEnv):
         self._shown = observation
         self._arguments["observation"] = observation
         self._truth: ObstacleDepth | None = None
-        detector = BoxTracker(self.intrinsics) if self.scenario.any_colour else None
-        table = ROBOT.workspace.table_height
-        self._fixator = Fixator(Perception(self.intrinsics, support_height_m=table, detector=detector), _GAINS)
+        self._fixator = Fixator(perception_for(self.scenario, self.intrinsics), _GAINS)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fixation_gym.envs.config import CONTROL_FREQUENCY
+from fixation_gym.envs.config import CONTROL_FREQUENCY, TASK
 from fixation_gym.evaluation.files import write_file, write_json
 from fixation_gym.export.config import ExportConfig
 from fixation_gym.export.recording import CHUNK_SIZE, FLAGS, NAMES, VIDEOS, Recorded, read_numbers
@@ -21,7 +21,6 @@ from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 _VERSION = "v3.0"
-_TASK = "pick up the object in the box of the first picture"
 _DATA_FILE, _EPISODES_FILE = "data/chunk-000/file-000.parquet", "meta/episodes/chunk-000/file-000.parquet"
 _COUNTERS = {"timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64"}
 _COUNTERS |= {"task_index": "int64"}
@@ -121,7 +120,7 @@ def _episode_rows(episodes: Sequence[Recorded], fps: int) -> dict[str, Any]:
     indices = np.array([episode.index for episode in episodes])
     rows: dict[str, Any] = {
         "episode_index": indices,
-        "tasks": [[_TASK]] * count,
+        "tasks": [[TASK]] * count,
         "length": np.array([episode.length for episode in episodes]),
         "data/chunk_index": np.zeros(count, np.int64),
         "data/file_index": np.zeros(count, np.int64),
@@ -179,5 +178,5 @@ def _write_tasks(path: Path) -> None:
     import pandas as pd
 
     packed = io.BytesIO()
-    pd.DataFrame({"task_index": [0]}, index=pd.Index([_TASK])).to_parquet(packed)
+    pd.DataFrame({"task_index": [0]}, index=pd.Index([TASK])).to_parquet(packed)
     write_file(path, packed.getvalue())
