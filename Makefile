@@ -4,7 +4,7 @@
 VENV := .venv/bin
 ARGS :=
 
-.PHONY: demo test test-core test-newest lint evaluate golden bench soak kills full_disk doctor core full lock clean
+.PHONY: demo test test-core test-newest clients lint evaluate golden bench soak kills full_disk doctor core full lock clean
 
 demo: core
 	$(VENV)/fixation-gym demo $(ARGS)
@@ -20,6 +20,10 @@ NEWEST_MUJOCO := 4.0.0
 test-newest: full
 	$(VENV)/uv pip install --quiet --target .venv/newest --no-deps mujoco==$(NEWEST_MUJOCO) 'mujoco-core~=$(NEWEST_MUJOCO)'
 	PYTHONPATH=.venv/newest $(VENV)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile tests/envs $(ARGS)
+
+# Programs that use the environments under other libraries, each installed beside .venv; 40 minutes, 10 GB. For nights.
+clients: full
+	$(VENV)/python tests/clients/run.py $(ARGS)
 
 lint: full
 	$(VENV)/ruff check .

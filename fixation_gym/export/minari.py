@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator, Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,6 @@ def write_dataset(folder: Path, episodes: Sequence[Recorded], config: ExportConf
         episodes: in the order of their numbers.
         config: that they were recorded with.
     """
-    import minari  # pyright: ignore[reportMissingImports]
     from minari.dataset.minari_storage import MinariStorage  # pyright: ignore[reportMissingImports]
 
     place = folder / ROOT / DATASET_ID
@@ -60,7 +60,7 @@ def write_dataset(folder: Path, episodes: Sequence[Recorded], config: ExportConf
     )
     env.close()
     about = f"Picks by the policy {config.policy} in {', '.join(config.scenarios)}."
-    storage.update_metadata({"dataset_id": DATASET_ID, "minari_version": minari.__version__})
+    storage.update_metadata({"dataset_id": DATASET_ID, "minari_version": metadata.version("minari")})
     storage.update_metadata({"algorithm_name": config.policy, "description": about})
     pictures = isinstance(env.observation_space, spaces.Dict) and "rgb" in env.observation_space.spaces
     storage.update_episodes(_buffer(folder, episode, pictures) for episode in episodes)
@@ -75,7 +75,9 @@ def _buffer(folder: Path, episode: Recorded, pictures: bool) -> Any:
     from minari.data_collector import EpisodeBuffer  # pyright: ignore[reportMissingImports]
 
     numbers = read_numbers(folder, episode.index)
-    observations = {key.removeprefix(OBSERVED): numbers[key] for key in numbers if key.startswith(OBSERVED)}
+    observations: dict[str, Any] = {
+        key.removeprefix(OBSERVED): numbers[key] for key in numbers if key.startswith(OBSERVED)
+    }
     if pictures:
         shown = _frames(video_file(folder, WRIST, episode.index), numbers[LAST_IMAGE_KEY].shape)
         observations["rgb"] = np.array([*shown, numbers[LAST_IMAGE_KEY]], np.uint8)

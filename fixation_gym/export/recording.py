@@ -97,7 +97,7 @@ def record(cell: Mapping[str, Any], folder: Path, index: int, fps: int) -> Recor
     paths = [video_file(folder, name, index) for name in VIDEOS]
     for path in (*paths, numbers_file(folder, index)):
         path.parent.mkdir(parents=True, exist_ok=True)
-    rows, observations, cells = [], [], []
+    rows, observations, cells, last = [], [], [], None
     sums = {name: _ChannelSums() for name in VIDEOS}
     with VideoWriter(paths[0], fps, _CRF) as wrist, VideoWriter(paths[1], fps, _CRF) as maps:
         for decision in _decisions(cell):
@@ -109,20 +109,21 @@ def record(cell: Mapping[str, Any], folder: Path, index: int, fps: int) -> Recor
             rows.append(decision.row)
             observations.append(decision.observation)
             cells.append(decision.cells)
-    observations.append(decision.following)
+            last = decision
+    assert last is not None  # no episode is without a decision
+    observations.append(last.following)
     numbers = {
         **{name: np.array([row[name] for row in rows], np.float32) for name in rows[0]},
         **{OBSERVED + key: np.array([seen[key] for seen in observations]) for key in observations[0]},
         **{f"sums:{name}": sums[name].moments() for name in VIDEOS},
         CELLS_KEY: np.array(cells),
-        TERMINATED_KEY: np.array(decision.terminated),
-        LAST_IMAGE_KEY: decision.following_image,
+        TERMINATED_KEY: np.array(last.terminated),
+        LAST_IMAGE_KEY: last.following_image,
     }
     packed = io.BytesIO()
     np.savez_compressed(packed, **numbers)  # pyright: ignore[reportArgumentType]
     write_file(numbers_file(folder, index), packed.getvalue())
-    last = rows[-1]
-    success, collision = bool(last["next.success"][0]), bool(last["next.collision"][0])
+    success, collision = bool(rows[-1]["next.success"][0]), bool(rows[-1]["next.collision"][0])
     return Recorded(index, cell["scenario"], cell["seed"], len(rows), success, collision)
 
 

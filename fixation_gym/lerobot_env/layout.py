@@ -40,15 +40,15 @@ class LeRobotLayout(gym.Wrapper[dict[str, Any], np.ndarray, dict[str, Any], np.n
             ValueError: if it is another one, or has no image.
         """
         super().__init__(env)
-        base = env.unwrapped
-        if type(base) is not FixationPickEnv or "rgb" not in base.observation_space.spaces:
+        base, given = env.unwrapped, env.observation_space
+        if type(base) is not FixationPickEnv or not isinstance(given, spaces.Dict) or "rgb" not in given.spaces:
             raise ValueError(f"LeRobotLayout is for FixationPick-v0 with an image_size, got {base}")
         self._base = base
         self._perception = perception_for(base.scenario, base.intrinsics) if zero_flow_map else None
-        pixels: dict[str, spaces.Space[Any]] = {"wrist": base.observation_space["rgb"]}
+        pixels: dict[str, spaces.Space[Any]] = {"wrist": given["rgb"]}
         if zero_flow_map:
             pixels["zero_flow_map"] = spaces.Box(0, 255, (CELLS, CELLS, 3), np.uint8)
-        own = [base.observation_space[key] for key in ("joint_pos", "gripper_width")]
+        own = [given[key] for key in ("joint_pos", "gripper_width")]
         low, high = (np.concatenate([getattr(box, bound) for box in own]) for bound in ("low", "high"))
         self.observation_space = spaces.Dict({"pixels": spaces.Dict(pixels), "agent_pos": spaces.Box(low, high)})
 
