@@ -146,7 +146,7 @@ def newer_python_row(out: Path) -> tuple[str, bool]:
     """What pip says on a Python that NumPy 1.26 has no wheels for."""
     python = shutil.which("python3.13")
     what = "`pip install`"
-    if python is None:
+    if python is None or subprocess.run([python, "-c", ""], capture_output=True).returncode:  # pyenv's may be empty
         return f"| Python 3.13 | - | {what} | not at hand |", True
     log = out / "python_3_13.log"
     run([python, "-m", "pip", "install", "--dry-run", "--no-deps", ROOT], log, INSTALL_SECONDS)
