@@ -21,7 +21,7 @@ test-newest: full
 	$(VENV)/uv pip install --quiet --target .venv/newest --no-deps mujoco==$(NEWEST_MUJOCO) 'mujoco-core~=$(NEWEST_MUJOCO)'
 	PYTHONPATH=.venv/newest $(VENV)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile tests/envs $(ARGS)
 
-# Programs that use the environments under other libraries, each installed beside .venv; 40 minutes, 10 GB. For nights.
+# Programs that use the environments under other libraries, each installed beside .venv: half an hour, 10 GB. For nights.
 clients: full
 	$(VENV)/python tests/clients/run.py $(ARGS)
 
