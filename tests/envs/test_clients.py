@@ -161,7 +161,8 @@ import mujoco.egl
 from OpenGL import EGL
 env = gym.make("FixationPickZFC-v0", image_size=(64, 80))
 env.reset(seed=0)
-context = env.unwrapped.wrist_view.renderer._gl_context._context
+view = env.unwrapped._views.view("observation", env.unwrapped.sim)
+context = view.renderer._gl_context._context
 display = mujoco.egl.EGL_DISPLAY
 {loss}
 try:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Generator
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -96,17 +97,17 @@ def break_second_scenario(patch: pytest.MonkeyPatch) -> None:
 
 
 def break_encoder(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(video.imageio_ffmpeg, "write_frames", raise_broken)
+    patch.setattr(video.subprocess, "Popen", raise_broken)
 
 
 def break_ffmpeg(patch: pytest.MonkeyPatch) -> None:
     """An ffmpeg that accepts every frame, and then writes nothing."""
 
-    def write_frames(*args: Any, **kwargs: Any) -> Generator[None, Any, None]:
-        while True:
-            yield
+    def start(writer: video.VideoWriter) -> subprocess.Popen[bytes]:
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        return subprocess.Popen(["cat"], **pipes)
 
-    patch.setattr(video.imageio_ffmpeg, "write_frames", write_frames)
+    patch.setattr(video.VideoWriter, "_start", start)
 
 
 def break_sheet(patch: pytest.MonkeyPatch) -> None:
