@@ -87,7 +87,7 @@ def _buffer(folder: Path, episode: Recorded, pictures: bool) -> Any:
         id=episode.index,
         seed=episode.seed,
         observations=observations,
-        actions=numbers["action"],
+        actions=numbers["action"],  # pyright: ignore[reportArgumentType]  (an array works; the hint leaves it out)
         rewards=numbers["next.reward"][:, 0].tolist(),
         terminations=(last & ended).tolist(),
         truncations=(last & (not ended)).tolist(),
