@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -28,21 +29,33 @@ class Observation:
     time: float
     """Seconds since the episode started."""
     rgb: ImageArray
-    """Wrist image, shape (H, W, 3), top-left origin."""
+    """Image of the camera, shape (H, W, 3), or (H, W) if it is grey; top-left origin."""
     joint_pos: FloatArray
-    """Arm joint angles, shape (n,), rad."""
+    """Arm joint angles, shape (n,), rad; n is 0 for a camera without an arm."""
     joint_vel: FloatArray
     """Arm joint velocities, shape (n,), rad/s."""
     camera_pose: FloatArray
     """Pose of ``cam`` in ``base``, shape (7,): position in m, then unit quaternion (w, x, y, z)."""
-    camera_twist: FloatArray
-    """Measured twist [v, w] of the camera expressed in ``cam``, shape (6,), m/s and rad/s."""
+    camera_twist: FloatArray | None
+    """Measured twist [v, w] of the camera expressed in ``cam``, shape (6,), m/s and rad/s; None: follows from poses."""
     gripper_width: float
-    """Opening between the finger pads, m."""
+    """Opening between the finger pads, m; NaN without a gripper."""
     target_box: FloatArray | None = None
     """Which thing is the target: x, y, width, height of a box around it in the first image, px, shape (4,)."""
     mask: MaskArray | None = None
     """Pixels of the target, shape (H, W), where somebody else finds it."""
+
+    @classmethod
+    def of_camera(
+        cls,
+        time: float,
+        rgb: ImageArray,
+        camera_pose: FloatArray,
+        target_box: FloatArray | None = None,
+        mask: MaskArray | None = None,
+    ) -> Observation:
+        """What a camera gives that is moved by anything whose pose is known: all that perception needs."""
+        return cls(time, rgb, np.zeros(0), np.zeros(0), camera_pose, None, math.nan, target_box, mask)
 
     @classmethod
     def from_dict(cls, obs: Mapping[str, Any]) -> Observation:

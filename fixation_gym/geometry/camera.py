@@ -1,11 +1,12 @@
-"""Pinhole camera: pixels, normalised image coordinates, rays."""
+"""Pinhole camera: pixels, normalised image coordinates, rays; and what its lens adds."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from numbers import Integral, Real
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -13,11 +14,34 @@ from fixation_gym.types import FloatArray
 
 _LARGEST = 32_767
 """Longest side of an image that OpenCV remaps, px."""
+LensModel = Literal["brown_conrady", "fisheye"]
+LENS_MODELS: tuple[LensModel, ...] = get_args(LensModel)
+_COEFFICIENT_COUNTS = {"brown_conrady": (4, 5, 8, 12, 14), "fisheye": (4,)}
+
+
+@dataclass(frozen=True)
+class Lens:
+    """How a lens bends what a pinhole would show, with OpenCV's models and order of coefficients."""
+
+    coefficients: tuple[float, ...]
+    """brown_conrady: k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]]; fisheye: k1 k2 k3 k4 of Kannala and Brandt."""
+    model: LensModel = "brown_conrady"
+
+    def __post_init__(self) -> None:
+        if self.model not in LENS_MODELS:
+            raise ValueError(f"unknown lens model '{self.model}'; choose one of {', '.join(LENS_MODELS)}")
+        counts = _COEFFICIENT_COUNTS[self.model]
+        if len(self.coefficients) not in counts or not all(map(math.isfinite, self.coefficients)):
+            wanted = " or ".join(map(str, counts))
+            raise ValueError(f"a {self.model} lens has {wanted} finite coefficients, got {self.coefficients}")
 
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """Pinhole intrinsics in pixels; pixel (0, 0) is the centre of the top-left pixel.
+    """Camera intrinsics in pixels; pixel (0, 0) is the centre of the top-left pixel.
+
+    All methods are those of the pinhole: pictures of a camera with a lens are undistorted first, see
+    ``perception.rectification``.
 
     Raises:
         ValueError: for sizes that are not whole numbers, and for values that are not finite.
@@ -29,6 +53,8 @@ class Intrinsics:
     fy: float
     cx: float
     cy: float
+    lens: Lens | None = None
+    """None: pictures are those of a pinhole."""
 
     def __post_init__(self) -> None:
         sizes = (self.height, self.width)
@@ -52,6 +78,11 @@ class Intrinsics:
             raise ValueError(f"height and width must be whole numbers, got {(height, width)}")
         focal = height / (2.0 * math.tan(fovy_rad / 2.0))
         return cls(width, height, focal, focal, (width - 1) / 2.0, (height - 1) / 2.0)
+
+    @property
+    def pinhole(self) -> Intrinsics:
+        """The camera of undistorted pictures."""
+        return replace(self, lens=None)
 
     @cached_property
     def matrix(self) -> FloatArray:
@@ -97,4 +128,4 @@ def _scaled(camera: Intrinsics, height: int, width: int) -> Intrinsics:
     sx, sy = width / camera.width, height / camera.height
     cx = (camera.cx + 0.5) * sx - 0.5
     cy = (camera.cy + 0.5) * sy - 0.5
-    return Intrinsics(width, height, camera.fx * sx, camera.fy * sy, cx, cy)
+    return Intrinsics(width, height, camera.fx * sx, camera.fy * sy, cx, cy, camera.lens)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from functools import lru_cache
 
+import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
@@ -29,6 +31,7 @@ from fixation_gym.perception.flow.optic_flow import (
     prepare_grey,
 )
 from fixation_gym.perception.percept import Percept
+from fixation_gym.perception.rectification import Rectification
 from fixation_gym.perception.scratch import Scratch
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.zero_flow import (
@@ -38,7 +41,7 @@ from fixation_gym.perception.zero_flow.zero_flow import (
     unknown_zero_flow,
     zero_flow_test,
 )
-from fixation_gym.types import MaskArray, Observation
+from fixation_gym.types import FloatArray, MaskArray, Observation
 
 _HIDDEN_S = 1.0
 """After this time out of sight the target's body may be anywhere, s."""
@@ -59,7 +62,8 @@ class Perception:
         """Prepare for a camera.
 
         Args:
-            intrinsics: of the images to come; any size.
+            intrinsics: of the images to come; any size. With a lens, images are undistorted first: all that a percept
+                says is about the pinhole's image, as detectors get it.
             settings: of every stage; None for the defaults.
             self_mask: pixels where the camera sees the robot itself, shape (H, W); never obstacles.
             support_height_m: height of the table in base, m; its surface is no obstacle. None: unknown.
@@ -72,9 +76,13 @@ class Perception:
         shape = (intrinsics.height, intrinsics.width)
         if self_mask is not None and self_mask.shape != shape:
             raise ValueError(f"self_mask has shape {self_mask.shape}, but the images are {shape}")
-        self._intrinsics = intrinsics
         self._settings = settings or PerceptionSettings()
         self._self_mask = None if self_mask is None else np.array(self_mask, dtype=np.bool_)
+        self._rectification = None if intrinsics.lens is None else Rectification(intrinsics)
+        if self._rectification is not None:
+            intrinsics = intrinsics.pinhole
+            self._self_mask = self._rectification.unseen(self._self_mask)
+        self._intrinsics = intrinsics
         self.support_height_m = support_height_m
         self._detector: Detector = detector or ColourDetector(intrinsics, self._settings.colour)
         self._estimator: DistanceEstimator = estimator or PoseEstimator(self._settings.distance)
@@ -110,12 +118,16 @@ class Perception:
         Raises:
             ValueError: if the image has the wrong shape or the time does not increase.
         """
+        observation = _in_colour(observation)
         self._check(observation)
+        if self._rectification is not None:
+            observation = self._rectification.observation(observation)
         T_base_cam = pose_to_matrix(observation.camera_pose)
         expected = expected_at(self._track, T_base_cam, observation.time, self._settings.tracking)
         segmentation = detected(self._detector, observation, expected, self._intrinsics)
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
-        frame = Frame(observation.time, grey, T_base_cam, observation.camera_twist, segmentation)
+        twist = self._twist(observation, T_base_cam)
+        frame = Frame(observation.time, grey, T_base_cam, twist, segmentation)
         self._estimator.add_frame(frame)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
@@ -140,6 +152,15 @@ class Perception:
         if self._frames and not observation.time > self._frames[-1].time:
             last = self._frames[-1].time
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
+
+    def _twist(self, observation: Observation, T_base_cam: FloatArray) -> FloatArray:
+        """The measured twist, or else the mean one since the frame before; a camera is at rest before its first."""
+        if observation.camera_twist is not None:
+            return observation.camera_twist
+        if not self._frames:
+            return np.zeros(6)
+        before = self._frames[-1]
+        return mean_twist(before.T_base_cam, T_base_cam, observation.time - before.time)
 
     def _fit_body(self, now: Frame, fixation: Fixation) -> UprightBody | None:
         """The target's body, with the outline of this frame."""
@@ -183,6 +204,14 @@ class Perception:
         fixated = inverse_distance(self._estimator, middle.T_base_cam)
         gaze = Gaze(twist, *fixated, middle.segmentation.mask, middle.T_base_cam)
         return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
+
+
+def _in_colour(observation: Observation) -> Observation:
+    """An observation whose image has three channels: a grey one, shape (H, W), gets three equal ones."""
+    image = observation.rgb
+    if image.ndim != 2 or image.dtype != np.uint8:
+        return observation
+    return replace(observation, rgb=np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), np.uint8))
 
 
 @lru_cache(maxsize=1)
