@@ -14,9 +14,10 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.detection.box_tracker import BoxTracker
 from fixation_gym.perception.detection.colour import ColourDetector
 from fixation_gym.perception.detection.detector import Detector
-from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
+from fixation_gym.perception.detection.named import DETECTOR_METHODS, DETECTORS, detector_named
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
+from fixation_gym.strangers import is_class_name, load_class, source_hash
 from fixation_policies.base import Policy
 from fixation_policies.baselines import RandomPolicy
 from fixation_policies.paper import PAPER_NAMES, paper_variant
@@ -24,20 +25,13 @@ from fixation_policies.rl.agent_file import read_card
 from fixation_policies.rl.config import CONFIGS, require_learning_packages
 from fixation_policies.servo.servo_policy import ServoPolicy
 from fixation_policies.servo.variants import VARIANT_NAMES, ServoVariant, servo_variant
-from fixation_policies.strangers import is_class_name, load_class, source_hash
 
 AGENT_SUFFIX = ".zip"
 POLICY_NAMES = (
     *("servo", "blind", "random", "oracle", "paper"),
     *(name for name in (*VARIANT_NAMES, *PAPER_NAMES) if ":" in name),
 )
-DETECTORS: dict[str, Callable[[Intrinsics], Detector]] = {
-    "colour": ColourDetector,
-    "mean_shift": MeanShiftDetector,
-    "box": BoxTracker,
-}
-"""Detectors by name: what has the target's colour, the same followed in the image, and what the first box shows."""
-_POLICY_METHODS, _DETECTOR_METHODS = ("reset", "act"), ("reset", "detect")
+_POLICY_METHODS = ("reset", "act")
 
 
 @dataclass(frozen=True)
@@ -79,11 +73,7 @@ def check_detector(name: str | None, policy: str) -> None:
         return
     if policy not in VARIANT_NAMES:
         raise UsageError(f"--detector goes with the policies that look: {', '.join(VARIANT_NAMES)}; got '{policy}'")
-    if name in DETECTORS:
-        return
-    if not is_class_name(name):
-        raise UsageError(f"unknown detector '{name}'; choose one of {', '.join(DETECTORS)}, or module:Class")
-    load_class(name, "--detector", _DETECTOR_METHODS)
+    detector_named(name)
 
 
 def source_hashes(policy: str, detector: str | None) -> dict[str, str]:
@@ -94,7 +84,7 @@ def source_hashes(policy: str, detector: str | None) -> dict[str, str]:
     elif policy not in POLICY_NAMES:
         hashes["policy_sha256"] = source_hash(policy, "--policy", _POLICY_METHODS)
     if detector is not None and detector not in DETECTORS:
-        hashes["detector_sha256"] = source_hash(detector, "--detector", _DETECTOR_METHODS)
+        hashes["detector_sha256"] = source_hash(detector, "--detector", DETECTOR_METHODS)
     return hashes
 
 
@@ -157,4 +147,4 @@ def _detector(name: str | None, variant: ServoVariant, env: Any) -> Callable[[In
     """What makes the detector of that name."""
     if name is None:
         return variant.detector or (BoxTracker if env.scenario.any_colour else ColourDetector)
-    return DETECTORS[name] if name in DETECTORS else load_class(name, "--detector", _DETECTOR_METHODS)
+    return detector_named(name)

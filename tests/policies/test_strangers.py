@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from fixation_gym.errors import UsageError
+from fixation_gym.strangers import is_class_name
 from fixation_policies import catalogue
 from fixation_policies.catalogue import check_detector, check_policy, make_policy, source_hashes
-from fixation_policies.strangers import is_class_name
 
 CODE = """
 import numpy as np

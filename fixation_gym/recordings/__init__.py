@@ -1,0 +1,1 @@
+"""Recordings of cameras that moved: readers of several layouts, and a writer of the project's own."""

@@ -1,0 +1,72 @@
+"""What ``replay`` runs, as a value. Imports nothing heavy, so that the command line answers at once."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from fixation_gym.errors import UsageError
+from fixation_gym.recordings.options import ReaderOptions
+
+Pixel = tuple[float, float]
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayConfig(ReaderOptions):
+    """Which recording, and which thing in it."""
+
+    recording: tyro.conf.Positional[Path]
+    """Folder or file: the project's own layout, TUM RGB-D, 7-Scenes, a video, an .npz, a ROS bag."""
+    reader: str | None = None
+    """layout, tum, 7scenes, npz, video, bag, or module:Class of your own; by default by what is there."""
+    target: str | None = None
+    """Which thing is the target: x,y,w,h of a box in the first picture, or x,y of one of its pixels, px; by default
+    the masks or the box of the recording."""
+    detector: str | None = None
+    """Finds the target: colour, mean_shift, box (what the first box shows), or module:Class of your own."""
+    rerun: Path | None = None
+    """Also write pictures, flow, map, target and camera path to this .rrd file, for the viewer Rerun."""
+
+    def check(self) -> None:
+        """Check everything that can be checked without the recording.
+
+        Raises:
+            UsageError: naming the first bad value and what is allowed, or the extra that is missing.
+        """
+        from fixation_gym.perception.detection.named import detector_named
+
+        parsed_target(self.target)
+        if self.detector is not None:
+            detector_named(self.detector)
+        if self.rerun is not None and importlib.util.find_spec("rerun") is None:
+            raise UsageError("--rerun needs rerun-sdk: pip install 'fixation-gym[viz]'")
+
+    def run_description(self) -> dict[str, Any]:
+        """What the estimates depend on."""
+        options = {name: getattr(self, name) for name in ReaderOptions.__dataclass_fields__}
+        paths = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
+        given = {name: value for name, value in paths.items() if value is not None}
+        return {"recording": str(self.recording), "target": self.target, "detector": self.detector, **given}
+
+
+def parsed_target(text: str | None) -> Box | Pixel | None:
+    """The numbers of ``--target``.
+
+    Raises:
+        UsageError: if they are not two or four.
+    """
+    if text is None:
+        return None
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (2, 4) or not all(map(math.isfinite, numbers)):
+        raise UsageError(f"--target must be x,y,w,h or x,y in px of the first picture, got '{text}'")
+    return numbers  # pyright: ignore[reportReturnType]  (two or four of them)

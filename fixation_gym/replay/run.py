@@ -1,0 +1,187 @@
+"""Run perception over a recording: a line of ``estimates.csv`` per picture, overlay video, figure and summary."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from contextlib import ExitStack, closing
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from fixation_gym.doctor import installed_versions
+from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.files import write_file, write_json
+from fixation_gym.evaluation.source import source_commit
+from fixation_gym.evaluation.storage import SUMMARY_FILE, check_no_folders, folder_lock, make_folder
+from fixation_gym.evaluation.video import VideoWriter, caption
+from fixation_gym.perception.drawing import draw_overlay
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.perception.settings import PerceptionSettings
+from fixation_gym.recordings.catalogue import open_recording
+from fixation_gym.recordings.stamps import OrderedFrames, in_order
+from fixation_gym.replay.config import ReplayConfig
+from fixation_gym.replay.figure import draw_distance
+from fixation_gym.replay.looks import Look, Straightener, looks
+from fixation_gym.replay.notes import notes_on
+from fixation_gym.replay.pose_check import check_poses
+from fixation_gym.replay.rows import ESTIMATES_FILE, Row, RowWriter, row_of
+from fixation_gym.replay.scores import distance_summary, map_counts, map_summary, mask_summary, overlap
+from fixation_gym.replay.target import Target, choose_target
+
+VIDEO_FILE, FIGURE_FILE = "overlay.mp4", "distance.png"
+FILES = (ESTIMATES_FILE, VIDEO_FILE, FIGURE_FILE, SUMMARY_FILE)
+_FPS = (1.0, 60.0)
+
+
+def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
+    """Run perception over a recording.
+
+    Args:
+        config: must have passed ``check``.
+        out: folder; made if needed. An earlier replay there is replaced.
+
+    Returns:
+        The summary, as in ``summary.json``.
+
+    Raises:
+        UsageError: if recording or folder cannot be used. If a picture in the middle cannot, all files are written for
+            those before it first.
+    """
+    started = time.monotonic()
+    recording = open_recording(config.recording, config, config.reader)
+    camera, pictures = recording.camera, len(recording)
+    first = next(iter(recording))
+    ordered = in_order(recording, str(config.recording))
+    target = choose_target(config, recording.target_box, ordered.frames[0], camera)
+    straightener = Straightener(camera)
+    left_px = check_poses(ordered.frames, camera.pinhole, straightener.image)
+    settings = PerceptionSettings()
+    perception = Perception(camera.pinhole, settings, straightener.unseen(), detector=target.detector)
+    make_folder(out)
+    with folder_lock(out):
+        check_no_folders(out, FILES)
+        _remove_earlier(out)
+        done = _Done(camera.pinhole)
+        error = _perceive(config, out, ordered, perception, target, straightener, done)
+        if done.rows:
+            write_file(out / FIGURE_FILE, draw_distance(done.rows))
+        gaps = ordered.gaps(settings.max_gap_s)
+        summary = {
+            "command": "replay",
+            **config.run_description(),
+            "found_by": target.found_by,
+            "pictures": pictures,
+            "perceived": len(done.rows),
+            "duplicate_times": ordered.duplicates,
+            "times_out_of_order": ordered.backwards,
+            "without_pose": ordered.without_pose,
+            "gaps": len(gaps),
+            "longest_gap_s": max(gaps, default=0.0),
+            "seen": sum(row["visible"] for row in done.rows),
+            "without_map": dict(Counter(row["no_map"] for row in done.rows if row["no_map"])),
+            "unexplained_px": left_px,
+            **done.scores(),
+            "perception_ms": 1000.0 * median(done.seconds) if done.seconds else None,
+            "error": None if error is None else str(error),
+            "versions": installed_versions(),
+            "commit": source_commit(),
+            "wall_s": time.monotonic() - started,
+        }
+        summary["notes"] = notes_on(summary, ordered.frames[0] is first)
+        write_json(out / SUMMARY_FILE, summary)
+    if error is not None:
+        raise UsageError(f"{error}; {len(done.rows)} pictures before it are in {out}")
+    return summary
+
+
+def _remove_earlier(out: Path) -> None:
+    """Remove the files of an earlier replay.
+
+    Raises:
+        UsageError: if another command's results are there.
+    """
+    if (out / SUMMARY_FILE).exists() and not (out / ESTIMATES_FILE).exists():
+        raise UsageError(f"{out} holds results of another command ({SUMMARY_FILE}); choose another --out")
+    for name in FILES:
+        (out / name).unlink(missing_ok=True)
+
+
+class _Done:
+    """What has been perceived so far: rows and sums."""
+
+    def __init__(self, camera: Any) -> None:
+        self.rows: list[Row] = []
+        self.seconds: list[float] = []
+        self._camera = camera
+        self._overlaps: list[float] = []
+        self._counts: Counter[str] = Counter()
+        self._maps = 0
+
+    def add(self, look: Look) -> Row:
+        """Note a look; returns its row."""
+        mask, shared = look.truth.mask, None
+        if mask is not None:
+            shared = overlap(look.percept.segmentation.mask, mask)
+            self._overlaps.append(shared)
+        row = row_of(look, self._camera, shared)
+        before = look.map_truth
+        if not row["no_map"] and before is not None and before.depth is not None and before.distance_m is not None:
+            self._counts += map_counts(look.percept.zfc, before.depth, before.distance_m, before.target)
+            self._maps += 1
+        self.rows.append(row)
+        self.seconds.append(look.perception_s)
+        return row
+
+    def scores(self) -> dict[str, Any]:
+        """Against truth; None where there is none."""
+        return {
+            "distance": distance_summary(self.rows),
+            "map": map_summary(self._counts, self._maps) if self._maps else None,
+            "mask": mask_summary(np.array(self._overlaps)) if self._overlaps else None,
+        }
+
+
+def _perceive(
+    config: ReplayConfig,
+    out: Path,
+    ordered: OrderedFrames,
+    perception: Perception,
+    target: Target,
+    straightener: Straightener,
+    done: _Done,
+) -> UsageError | None:
+    """Perceive all frames; returns what was wrong with one, after which nothing more is perceived."""
+    frames = ordered.frames
+    periods = np.diff([frame.time for frame in frames]) if len(frames) > 1 else np.ones(1)
+    fps = float(np.clip(1.0 / np.median(periods), *_FPS))
+    progress = tqdm(total=len(frames), unit="picture", dynamic_ncols=True)
+    with ExitStack() as opened:
+        opened.enter_context(closing(progress))
+        rows = opened.enter_context(RowWriter(out / ESTIMATES_FILE))
+        video = opened.enter_context(VideoWriter(out / VIDEO_FILE, fps))
+        log = None
+        if config.rerun is not None:
+            from fixation_gym.replay.rerun_log import RerunLog
+
+            log = opened.enter_context(RerunLog(config.rerun, perception.flow_intrinsics))
+        try:
+            for look in looks(frames, perception, target, straightener):
+                row = done.add(look)
+                rows.write(row)
+                video.add(caption(draw_overlay(look.rgb, look.percept), _caption(look, row)))
+                if log is not None:
+                    log.add(look)
+                progress.update()
+        except UsageError as error:
+            return error
+    return None
+
+
+def _caption(look: Look, row: Row) -> str:
+    truth = "" if row["distance_true_m"] is None else f"   truth {100 * row['distance_true_m']:.1f} cm"
+    why = f"   no map: {row['no_map']}" if row["no_map"] else ""
+    return f"{look.percept.time:.2f} s   {look.name}{truth}{why}"
