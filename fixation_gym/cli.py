@@ -115,6 +115,24 @@ class Export(ExportConfig):
         return 0
 
 
+@dataclass(frozen=True)
+class Record(EvaluationConfig):
+    """Record a policy's episodes as pictures, poses and truth that replay takes. The same command again resumes."""
+
+    out: Path = Path("out/record")
+    """Folder of the recordings."""
+
+    def run(self) -> int:
+        """Record and say where."""
+        self.check()
+        select_backend()
+        from fixation_gym.recordings.record import record
+
+        summary = record(self, self.out)
+        print(f"{summary['pictures']} pictures\n\n" + "\n".join(str(self.out / name) for name in summary["recordings"]))
+        return 0
+
+
 @dataclass(frozen=True, kw_only=True)
 class Replay(ReplayConfig):
     """Perception on recorded pictures of any camera whose poses are known: estimates, overlay video, scores."""
@@ -226,6 +244,7 @@ Commands = (
     | Annotated[Ablate, tyro.conf.subcommand("ablate")]
     | Annotated[Ladder, tyro.conf.subcommand("ladder")]
     | Annotated[Export, tyro.conf.subcommand("export")]
+    | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Replay, tyro.conf.subcommand("replay")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Train, tyro.conf.subcommand("train")]

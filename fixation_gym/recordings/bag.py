@@ -87,8 +87,8 @@ def _opened(path: Path) -> Iterator[Any]:
     Raises:
         UsageError: if it cannot be opened or read.
     """
-    from rosbags.highlevel import AnyReader, AnyReaderError
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.highlevel import AnyReader, AnyReaderError  # pyright: ignore[reportMissingImports]
+    from rosbags.typesys import Stores, get_typestore  # pyright: ignore[reportMissingImports]
 
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:

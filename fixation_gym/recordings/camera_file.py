@@ -43,8 +43,8 @@ def read_camera(path: Path) -> Intrinsics:
             raise UsageError(f"{path} needs a number as '{key}', got {value!r}")
     lens = _lens(path, values.get("distortion", []), values.get("distortion_model", LENS_MODELS[0]))
     try:
-        size = int(values["width"]), int(values["height"])
-        return Intrinsics(*size, *(float(values[key]) for key in _NUMBERS), lens)
+        fx, fy, cx, cy = (float(values[key]) for key in _NUMBERS)
+        return Intrinsics(int(values["width"]), int(values["height"]), fx, fy, cx, cy, lens)
     except ValueError as error:
         raise UsageError(f"{path}: {error}") from error
 

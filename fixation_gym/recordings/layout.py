@@ -21,7 +21,7 @@ CAMERA_FILE, FRAMES_FILE, TARGET_FILE = "camera.json", "frames.csv", "target.jso
 IMAGE_COLUMN, DEPTH_COLUMN, MASK_COLUMN, DISTANCE_COLUMN = "rgb", "depth", "mask", "distance_true_m"
 JOINT_PREFIX = "joint_"
 BOX_KEY = "first_frame_box_xywh"
-_DEPTH_UNIT_M = 1e-3
+DEPTH_UNIT_M = 1e-3
 
 
 def read_layout(folder: Path, options: ReaderOptions) -> FrameList:
@@ -49,7 +49,7 @@ def _frame(folder: Path, row: Row, camera: Intrinsics, joints: tuple[str, ...]) 
         camera_pose=None if pose is None else pose_of(pose, f"{row.place}, columns 'qw' to 'qz'"),
         joint_pos=None if angles is None else np.array(angles),
         mask=partial(read_mask, folder / mask, camera) if mask else None,
-        depth=partial(read_depth, folder / depth, camera, _DEPTH_UNIT_M) if depth else None,
+        depth=partial(read_depth, folder / depth, camera, DEPTH_UNIT_M) if depth else None,
         distance_true_m=row.number(DISTANCE_COLUMN) if row.cells.get(DISTANCE_COLUMN) else None,
     )
 

@@ -40,7 +40,7 @@ def read_mask(path: Path, camera: Intrinsics) -> MaskArray:
     """
     image = _read(path)
     check_size(image, camera, str(path))
-    return image > 0 if image.ndim == 2 else image[..., :3].any(axis=2)
+    return np.asarray(image > 0 if image.ndim == 2 else image[..., :3].any(axis=2), np.bool_)
 
 
 def read_depth(path: Path, camera: Intrinsics, unit_m: float, none: tuple[int, ...] = (0,)) -> Float32Array:
