@@ -36,8 +36,9 @@ class Observation:
     """Arm joint velocities, shape (n,), rad/s."""
     camera_pose: FloatArray
     """Pose of ``cam`` in ``base``, shape (7,): position in m, then unit quaternion (w, x, y, z)."""
-    camera_twist: FloatArray | None
-    """Measured twist [v, w] of the camera expressed in ``cam``, shape (6,), m/s and rad/s; None: follows from poses."""
+    camera_twist: FloatArray
+    """Measured twist [v, w] of the camera expressed in ``cam``, shape (6,), m/s and rad/s; NaN: it follows from poses.
+    """
     gripper_width: float
     """Opening between the finger pads, m; NaN without a gripper."""
     target_box: FloatArray | None = None
@@ -55,7 +56,7 @@ class Observation:
         mask: MaskArray | None = None,
     ) -> Observation:
         """What a camera gives that is moved by anything whose pose is known: all that perception needs."""
-        return cls(time, rgb, np.zeros(0), np.zeros(0), camera_pose, None, math.nan, target_box, mask)
+        return cls(time, rgb, np.zeros(0), np.zeros(0), camera_pose, np.full(6, math.nan), math.nan, target_box, mask)
 
     @classmethod
     def from_dict(cls, obs: Mapping[str, Any]) -> Observation:

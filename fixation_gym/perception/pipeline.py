@@ -7,7 +7,6 @@ from collections import deque
 from dataclasses import replace
 from functools import lru_cache
 
-import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
@@ -31,7 +30,7 @@ from fixation_gym.perception.flow.optic_flow import (
     prepare_grey,
 )
 from fixation_gym.perception.percept import Percept
-from fixation_gym.perception.rectification import Rectification
+from fixation_gym.perception.rectification import Rectification, in_colour
 from fixation_gym.perception.scratch import Scratch
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.zero_flow import (
@@ -118,7 +117,8 @@ class Perception:
         Raises:
             ValueError: if the image has the wrong shape or the time does not increase.
         """
-        observation = _in_colour(observation)
+        if observation.rgb.ndim == 2:
+            observation = replace(observation, rgb=in_colour(observation.rgb))
         self._check(observation)
         if self._rectification is not None:
             observation = self._rectification.observation(observation)
@@ -155,7 +155,7 @@ class Perception:
 
     def _twist(self, observation: Observation, T_base_cam: FloatArray) -> FloatArray:
         """The measured twist, or else the mean one since the frame before; a camera is at rest before its first."""
-        if observation.camera_twist is not None:
+        if not math.isnan(observation.camera_twist[0]):
             return observation.camera_twist
         if not self._frames:
             return np.zeros(6)
@@ -204,14 +204,6 @@ class Perception:
         fixated = inverse_distance(self._estimator, middle.T_base_cam)
         gaze = Gaze(twist, *fixated, middle.segmentation.mask, middle.T_base_cam)
         return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
-
-
-def _in_colour(observation: Observation) -> Observation:
-    """An observation whose image has three channels: a grey one, shape (H, W), gets three equal ones."""
-    image = observation.rgb
-    if image.ndim != 2 or image.dtype != np.uint8:
-        return observation
-    return replace(observation, rgb=np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), np.uint8))
 
 
 @lru_cache(maxsize=1)

@@ -1,4 +1,4 @@
-"""Take the lens out of pictures: what a pinhole camera with the same K would have seen."""
+"""Pictures of any camera as perception takes them: with three channels, and as a pinhole with the same K sees them."""
 
 from __future__ import annotations
 
@@ -16,6 +16,13 @@ from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 _LEAST_COLUMNS = 80
 _EDGE_POINTS = 16
 """Points along each side of a box: a lens bends its sides."""
+
+
+def in_colour(image: ImageArray) -> ImageArray:
+    """A grey image, shape (H, W), uint8, with three equal channels; any other stays as it is."""
+    if image.ndim != 2 or image.dtype != np.uint8:
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), np.uint8)
 
 
 class Rectification:

@@ -68,7 +68,7 @@ def record(config: EvaluationConfig, out: Path) -> dict[str, Any]:
             processes=config.workers,
             backend=config.backend,
         )
-        workers.close_worlds()
+        workers.close_kept()
         episodes = [store.finished[key] for key in cells]
         summary = {
             **description,

@@ -6,13 +6,12 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.perception.rectification import Rectification
+from fixation_gym.perception.rectification import Rectification, in_colour
 from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.replay.scores import depth_over
@@ -61,8 +60,7 @@ class Straightener:
 
     def image(self, image: ImageArray) -> ImageArray:
         """A picture as the pinhole sees it, shape (H, W, 3)."""
-        if image.ndim == 2:
-            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), np.uint8)
+        image = in_colour(image)
         return image if self._rectification is None else self._rectification.image(image)
 
     def mask(self, frame: RecordedFrame) -> MaskArray | None:

@@ -128,7 +128,10 @@ def _followed(
     a: RecordedFrame, b: RecordedFrame, camera: Intrinsics, straighten: Callable[[ImageArray], ImageArray]
 ) -> _Pair | None:
     """Corners that are found again, forward and back; None if there are few."""
-    first, second = (_grey(straighten(frame.image())) for frame in (a, b))
+    try:
+        first, second = (_grey(straighten(frame.image())) for frame in (a, b))
+    except UsageError:  # who perceives this picture says so, after those before it
+        return None
     corners = cv2.goodFeaturesToTrack(first, _CORNERS, 0.01, 8.0)
     if corners is None or a.camera_pose is None or b.camera_pose is None:
         return None

@@ -9,7 +9,9 @@ import numpy as np
 from fixation_gym.errors import UsageError
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.detection.detector import Detector, GivenMasks
+from fixation_gym.perception.detection.first_look import box_from_pixel
 from fixation_gym.perception.detection.named import detector_named
+from fixation_gym.perception.rectification import in_colour
 from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.replay.config import ReplayConfig, parsed_target
 from fixation_gym.types import FloatArray, ImageArray
@@ -44,7 +46,7 @@ def choose_target(config: ReplayConfig, box: FloatArray | None, first: RecordedF
     """
     given = parsed_target(config.target)
     if given is not None:
-        box = np.array(given if len(given) == 4 else _box_around(first.image(), given, camera))
+        box = np.array(given if len(given) == 4 else _box_around(first.image(), given))
     if box is not None:
         _check_inside(box, camera, "--target" if given is not None else "the recording's target box")
     if config.detector is None and given is None and first.mask is not None:
@@ -59,23 +61,17 @@ def choose_target(config: ReplayConfig, box: FloatArray | None, first: RecordedF
 
 def _check_inside(box: FloatArray, camera: Intrinsics, name: str) -> None:
     x, y, width, height = box.tolist()
-    size = f"{camera.width} x {camera.height}"
+    what, size = f"{name} {x:g},{y:g},{width:g},{height:g}", f"{camera.width} x {camera.height}"
     if x < 0 or y < 0 or x + width > camera.width or y + height > camera.height:
-        raise UsageError(f"{name} {x:g},{y:g},{width:g},{height:g} lies outside the first picture, which is {size}")
+        raise UsageError(f"{what} reaches out of the first picture, which is {size} px")
     if min(width, height) < _LEAST_BOX_PX:
-        raise UsageError(
-            f"{name} {x:g},{y:g},{width:g},{height:g} must be {_LEAST_BOX_PX} x {_LEAST_BOX_PX} px at least"
-        )
+        raise UsageError(f"{what} must be {_LEAST_BOX_PX} x {_LEAST_BOX_PX} px at least")
 
 
-def _box_around(image: ImageArray, pixel: tuple[float, ...], camera: Intrinsics) -> FloatArray:
+def _box_around(image: ImageArray, pixel: tuple[float, ...]) -> FloatArray:
     """Box around the thing that a pixel shows."""
-    from fixation_gym.perception.detection.first_look import box_from_pixel
-
     x, y = pixel
-    if not (0 <= x < camera.width and 0 <= y < camera.height):
-        raise UsageError(f"--target {x:g},{y:g} lies outside the first picture, {camera.width} x {camera.height}")
     try:
-        return box_from_pixel(image, (x, y))
+        return box_from_pixel(in_colour(image), (x, y))
     except ValueError as error:
-        raise UsageError(f"--target {x:g},{y:g}: {error}; give a box x,y,w,h") from error
+        raise UsageError(f"--target: {error}") from error

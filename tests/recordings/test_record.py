@@ -1,0 +1,111 @@
+"""Episodes that ``record`` wrote are what the policy met, and replay says of them what perception said then."""
+
+import csv
+import dataclasses
+
+import numpy as np
+import pytest
+
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.geometry.rigid import inverse, transform
+from fixation_gym.perception.detection.colour import ColourDetector
+from fixation_gym.perception.pipeline import Perception
+from fixation_gym.recordings.catalogue import open_recording
+from fixation_gym.replay.config import ReplayConfig
+from fixation_gym.replay.run import replay
+from fixation_gym.types import Observation
+
+pytestmark = pytest.mark.sim
+SMALL, STEPS = (96, 128), 14
+CONFIG = EvaluationConfig(policy="servo", scenarios=("opaque",), episodes=1, sensor_noise="nominal", image_size=SMALL)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Folder of recordings, of episodes that are cut short."""
+    import gymnasium as gym
+
+    import fixation_gym  # noqa: F401
+    from fixation_gym.gl import select_backend
+    from fixation_gym.recordings.record import record
+
+    select_backend()
+    spec = gym.spec("FixationPick-v0")
+    before, spec.max_episode_steps = spec.max_episode_steps, STEPS
+    out = tmp_path_factory.mktemp("recorded") / "set"
+    try:
+        record(CONFIG, out)
+        yield out
+    finally:
+        spec.max_episode_steps = before
+
+
+@pytest.fixture(scope="module")
+def met(recorded):
+    """What the policy met in the same episode: observations, the camera, and the target's true centre in ``cam``."""
+    import gymnasium as gym
+
+    from fixation_policies.catalogue import make_policy
+
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=SMALL, max_episode_steps=STEPS)
+    policy = make_policy("servo", env)
+    obs, _ = env.reset(seed=0)
+    policy.reset(0)
+    observations, centres = [], []
+    for _ in range(STEPS):
+        observations.append(obs)
+        base = env.unwrapped
+        T_cam_base = inverse(base.sim.arm_state().camera_pose)
+        centres.append(transform(T_cam_base, base.sim.body_position("target")))
+        obs, *_ = env.step(policy.act(obs))
+    yield observations, env.unwrapped.intrinsics, centres
+    env.close()
+
+
+def test_pictures_poses_and_joints_are_bit_by_bit_those_of_the_episode(recorded, met):
+    observations, camera, _ = met
+    recording = open_recording(recorded / "opaque-000000")
+    assert recording.camera == camera
+    np.testing.assert_array_equal(recording.target_box, observations[0]["target_box"])
+    for frame, obs in zip(recording, observations, strict=True):
+        np.testing.assert_array_equal(frame.image(), obs["rgb"])
+        np.testing.assert_array_equal(frame.camera_pose, obs["camera_pose"].astype(float))
+        np.testing.assert_array_equal(frame.joint_pos, obs["joint_pos"].astype(float))
+        assert frame.time == float(obs["time"][0])
+
+
+def test_depth_and_mask_are_those_of_the_target(recorded, met):
+    _, camera, centres = met
+    for frame, centre in zip(open_recording(recorded / "opaque-000000"), centres, strict=True):
+        mask, depth = frame.mask(), frame.depth()
+        assert mask.sum() > 30
+        rows, columns = np.nonzero(mask)
+        assert np.hypot(*(camera.project(centre) - [columns.mean(), rows.mean()])) < 6.0
+        assert np.median(depth[mask]) == pytest.approx(centre[2], abs=0.06)  # of the surface, not of the centre
+        assert frame.distance_true_m == pytest.approx(np.median(depth[mask]), abs=1e-3)
+
+
+def test_replay_says_what_perception_says_of_the_observations(recorded, met, tmp_path):
+    observations, camera, _ = met
+    replay(ReplayConfig(recording=recorded / "opaque-000000", detector="colour"), tmp_path)
+    with (tmp_path / "estimates.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    perception = Perception(camera, detector=ColourDetector(camera))
+    for row, obs in zip(rows, observations, strict=True):
+        percept = perception.update(Observation.from_dict(obs))
+        assert float(row["distance_m"]) == percept.fixation.distance_m
+        assert float(row["distance_std_m"]) == percept.fixation.distance_std_m
+        if not row["no_map"]:
+            assert float(row["map_front"]) == np.mean(percept.zfc.cells > 128)
+
+
+def test_a_finished_episode_is_not_recorded_again(recorded):
+    from fixation_gym.recordings.record import record
+
+    before = (recorded / "opaque-000000" / "frames.csv").stat().st_mtime_ns
+    summary = record(dataclasses.replace(CONFIG, episodes=2), recorded)
+    assert summary["episodes_resumed"] == 1
+    assert summary["recordings"] == ["opaque-000000", "opaque-000001"]
+    assert summary["pictures"] == 2 * STEPS
+    assert (recorded / "opaque-000000" / "frames.csv").stat().st_mtime_ns == before
+    assert len(open_recording(recorded / "opaque-000001")) == STEPS
