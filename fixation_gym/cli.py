@@ -26,7 +26,7 @@ from fixation_gym.export.config import ExportConfig
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train
 from fixation_gym.names import Names
-from fixation_gym.replay.config import ReplayConfig
+from fixation_gym.recording_commands import Record, Replay
 from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, print_different
 
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
@@ -112,42 +112,6 @@ class Export(ExportConfig):
 
         summary = export(self, self.out)
         print(f"{summary['episodes']} episodes, {summary['frames']} frames, {summary['successes']} picks\n\n{self.out}")
-        return 0
-
-
-@dataclass(frozen=True)
-class Record(EvaluationConfig):
-    """Record a policy's episodes as pictures, poses and truth that replay takes. The same command again resumes."""
-
-    out: Path = Path("out/record")
-    """Folder of the recordings."""
-
-    def run(self) -> int:
-        """Record and say where."""
-        self.check()
-        select_backend()
-        from fixation_gym.recordings.record import record
-
-        summary = record(self, self.out)
-        print(f"{summary['pictures']} pictures\n\n" + "\n".join(str(self.out / name) for name in summary["recordings"]))
-        return 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Replay(ReplayConfig):
-    """Perception on recorded pictures of any camera whose poses are known: estimates, overlay video, scores."""
-
-    out: Path = Path("out/replay")
-    """Folder of the results; an earlier replay there is replaced."""
-
-    def run(self) -> int:
-        """Perceive and print what came out."""
-        self.check()
-        from fixation_gym.replay.notes import format_summary
-        from fixation_gym.replay.run import FILES, replay
-
-        print(format_summary(replay(self, self.out)))
-        print("\n" + "\n".join(str(self.out / name) for name in FILES))
         return 0
 
 

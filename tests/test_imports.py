@@ -35,6 +35,14 @@ FORBIDDEN = {
         "fixation_gym.envs",
         "fixation_gym.evaluation",
     ),
+    "fixation_gym/replay": (
+        "gymnasium",
+        "mujoco",
+        "robosuite",
+        "torch",
+        "fixation_gym.envs",
+        "fixation_gym.experiments",
+    ),
     "fixation_gym/envs": ("torch", "fixation_gym.evaluation", "fixation_gym.experiments", "fixation_policies"),
 }
 FORBIDDEN["fixation_gym/robots"] += ("fixation_gym.control", "fixation_gym.geometry", "fixation_gym.perception")

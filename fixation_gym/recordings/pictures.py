@@ -15,6 +15,8 @@ from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.types import ImageArray, MaskArray
 
 Item = TypeVar("Item")
+_LEAST_PIXELS = 20
+"""So many pixels of a target must have depth for their median to be its distance."""
 
 
 def read_image(path: Path, camera: Intrinsics) -> ImageArray:
@@ -64,6 +66,13 @@ def read_depth(path: Path, camera: Intrinsics, unit_m: float, none: tuple[int, .
     depth = image.astype(np.float32) * np.float32(unit_m)
     depth[np.isin(image, none)] = np.nan
     return depth
+
+
+def depth_over(mask: MaskArray, depth: Float32Array) -> float | None:
+    """Median depth of the pixels of a mask, both of shape (H, W), m; None where too few have one."""
+    values = depth[mask]
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if len(values) >= _LEAST_PIXELS else None
 
 
 def check_size(image: np.ndarray, camera: Intrinsics, name: str) -> None:

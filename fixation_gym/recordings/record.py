@@ -18,8 +18,8 @@ from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import EPISODES_FILE, SUMMARY_FILE, ResultStore
 from fixation_gym.perception.scratch import Float32Array
+from fixation_gym.recordings.pictures import depth_over
 from fixation_gym.recordings.writer import LayoutWriter
-from fixation_gym.replay.scores import depth_over
 from fixation_gym.types import MaskArray
 
 

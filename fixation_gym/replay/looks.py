@@ -13,8 +13,8 @@ from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.rectification import Rectification, in_colour
 from fixation_gym.perception.scratch import Float32Array
+from fixation_gym.recordings.pictures import depth_over
 from fixation_gym.recordings.recording import RecordedFrame
-from fixation_gym.replay.scores import depth_over
 from fixation_gym.replay.target import Target
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 

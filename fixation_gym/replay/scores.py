@@ -26,15 +26,6 @@ DEPTH_MARGIN = 0.10
 """Depths that differ from the target's by less are not asked about."""
 KNOWN_STD = 0.15
 """A distance counts as known from this share of it on, as in the zero-flow test."""
-_LEAST_PIXELS = 20
-"""So many pixels of a target must have depth for their median to be its distance."""
-
-
-def depth_over(mask: MaskArray, depth: Float32Array) -> float | None:
-    """Median depth of the pixels of a mask, both of shape (H, W), m; None where too few have one."""
-    values = depth[mask]
-    values = values[np.isfinite(values)]
-    return float(np.median(values)) if len(values) >= _LEAST_PIXELS else None
 
 
 def overlap(found: MaskArray, true: MaskArray) -> float:
