@@ -92,6 +92,8 @@ COMMANDS = {
         ("ablate", cli.Ablate),
         ("ladder", cli.Ladder),
         ("export", cli.Export),
+        ("record", cli.Record),
+        ("replay", cli.Replay),
         ("report", cli.Report),
         ("train", cli.Train),
         ("compare", cli.Compare),
@@ -124,7 +126,7 @@ def command_lines(draw):
 def test_options_of_commands(line):
     command = works_or_says(UsageError, lambda: cli.parse(line))
     if command is not None and hasattr(command, "check"):
-        works_or_says(UsageError, command.check)
+        assert works_or_says(UsageError, command.check) is None
 
 
 @given(changed({"width": 40, "height": 30, "fx": 40.0, "fy": 40.0, "cx": 19.5, "cy": 14.5}))

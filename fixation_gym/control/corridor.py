@@ -76,23 +76,6 @@ def free_directions(
     return np.asarray(~any_meets(target, hand_axes(directions, rolls), boxes, swept_hand(margin)))
 
 
-def barred_directions(target: FloatArray, obstacles: BoxSet, directions: FloatArray, depth: float) -> MaskArray:
-    """Tell for each direction whether a hand that comes straight in surely touches an obstacle.
-
-    Between free and barred are the ways on which it depends on the wrist's turn, or on millimetres.
-
-    Args:
-        target: point the finger tips go to, shape (3,), in base, m.
-        obstacles: boxes around the obstacles.
-        directions: unit vectors from target to camera, shape (n, 3), in base.
-        depth: by which the hand is taken to be smaller than it is, m.
-
-    Returns:
-        Mask of shape (n,).
-    """
-    return any_meets(target, hand_axes(directions), obstacles, swept_hand(-depth, wrist=False))
-
-
 def hand_axes(directions: FloatArray, rolls: FloatArray | None = None) -> FloatArray:
     """Rows x, y, z of cameras that look against the directions, shape (n, 3, 3): level, or turned by ``rolls``, (n,).
 

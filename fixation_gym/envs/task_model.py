@@ -16,7 +16,7 @@ from fixation_gym.envs.robosuite_backend import ROBOT_BODIES, SceneExtension, bu
 
 @dataclass(frozen=True, eq=False)
 class TaskModel:
-    """Model, its data, and whose geoms are whose."""
+    """Model, its data, and the body that every geom belongs to."""
 
     model: Any
     """``mjModel``."""

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fixation_gym.control.box_tests import boxes_meet
-from fixation_gym.control.corridor import barred_directions, free_directions, hand_boxes
+from fixation_gym.control.box_tests import any_meets, boxes_meet
+from fixation_gym.control.corridor import free_directions, hand_axes, hand_boxes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import SCENARIOS, Scenario
 from fixation_gym.envs.goal import Way
@@ -69,7 +69,8 @@ def test_the_free_way_is_free_with_room_wherever_the_target_is_and_whatever_move
 def test_the_first_line_of_sight_and_most_other_ways_are_barred(name):
     for scene in scenes(name):
         end = scene.target.places[-1]
-        free = ~barred_directions(end, still_boxes(scene), reachable_directions(end), 0.01)
+        smaller = swept_hand(-0.01, wrist=False)  # a way is barred if even a hand that is smaller by 1 cm touches
+        free = ~any_meets(end, hand_axes(reachable_directions(end)), still_boxes(scene), smaller)
         assert free.mean() <= 0.33
         steep = REACH_GRID[:, 1] > np.radians(75.0)
         near_free = reachable_directions(end) @ Way(*scene.free_way).direction > np.cos(np.radians(12.0))

@@ -69,5 +69,6 @@ def test_workers_end_soon_after_a_run_that_was_killed(tmp_path):
     wait_until(lambda: all(file.exists() and file.read_text() for file in files))
     main.kill()
     main.wait()
-    for file in files:
-        wait_until(lambda file=file: not runs(int(file.read_text())), 20.0)
+    workers = [int(file.read_text()) for file in files]
+    wait_until(lambda: not any(map(runs, workers)), 20.0)
+    assert len(set(workers) | {main.pid}) == 3

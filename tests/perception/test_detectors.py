@@ -9,7 +9,8 @@ import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception import ColourDetector, GivenMasks, Perception
-from fixation_gym.perception.detection.box_tracker import BoxTracker, checked_box
+from fixation_gym.perception.detection.box_tracker import BoxTracker
+from fixation_gym.perception.detection.first_look import checked_box
 from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.detection.tracking import FIRST_LOOK, Expectation
 from fixation_gym.types import Observation

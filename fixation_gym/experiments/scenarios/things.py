@@ -1,4 +1,4 @@
-"""Places one thing of a hard scene where its side cannot be told from its place. Knows no simulator.
+"""Places one thing of a hard scene where its place does not give its side away. Knows no simulator.
 
 Whatever stands on the table is nearer than the table behind it, so where the table's plane is nearer than the target,
 all that is seen is in front, and no instance can be otherwise. The plane is blind where it is farther than the target:

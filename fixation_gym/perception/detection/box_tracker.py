@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.detection.first_look import checked_box, cut_out
 from fixation_gym.perception.detection.tracking import Expectation
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 
@@ -71,7 +72,7 @@ class BoxTracker:
         """
         if self._target is None:
             box = checked_box(observation.target_box, self._intrinsics)
-            mask = _cut_out(observation.rgb, box, self._settings.surroundings)
+            mask = cut_out(observation.rgb, box, self._settings.surroundings)
             self._learn(observation.rgb, mask, 1.0)
             self._around = 0.5 * (self._background + _histogram(_bins(observation.rgb), ~mask))
             self._background = self._around
@@ -168,56 +169,12 @@ class BoxTracker:
         self._target = (1.0 - keep) * lately + keep * self._first
 
 
-def checked_box(box: FloatArray | None, camera: Intrinsics) -> tuple[int, int, int, int]:
-    """A box as whole pixels of the image: left, top, width, height.
-
-    Raises:
-        ValueError: if there is none, it lies outside the image, or is around nothing.
-    """
-    size = f"{camera.width} x {camera.height}"
-    if box is None or np.shape(box) != (4,) or not np.all(np.isfinite(box)):
-        raise ValueError(f"target_box must be x, y, width, height in px of the first image ({size}), got {box}")
-    x, y, width, height = np.asarray(box, np.float64).tolist()
-    left, top = max(0, math.floor(x)), max(0, math.floor(y))
-    right, bottom = min(camera.width, math.ceil(x + width)), min(camera.height, math.ceil(y + height))
-    if right - left < 3 or bottom - top < 3:
-        got = [x, y, width, height]
-        raise ValueError(f"target_box must hold at least 3 x 3 px of the first image ({size}), got {got}")
-    return left, top, right - left, bottom - top
-
-
 def _size(mask: MaskArray, camera: Intrinsics) -> float:
     """Standard deviation of the pixels of a mask, normalised coordinates; 0 if there are none."""
     moments = cv2.moments(mask.view(np.uint8), binaryImage=True)
     if moments["m00"] < 4.0:
         return 0.0
     return math.sqrt(0.5 * (moments["mu20"] + moments["mu02"]) / moments["m00"]) / camera.fx
-
-
-def _cut_out(rgb: ImageArray, box: tuple[int, int, int, int], surroundings: float) -> MaskArray:
-    """The thing in a box, shape (H, W); where nothing stands out, the ellipse in the box."""
-    left, top, width, height = box
-    margin = max(6, round(surroundings * max(width, height)))
-    rows = slice(max(0, top - margin), min(rgb.shape[0], top + height + margin))
-    columns = slice(max(0, left - margin), min(rgb.shape[1], left + width + margin))
-    part = np.ascontiguousarray(rgb[rows, columns])
-    inner = (left - columns.start, top - rows.start, width, height)
-    labels = np.full(part.shape[:2], cv2.GC_BGD, np.uint8)
-    box_rows, box_columns = slice(inner[1], inner[1] + height), slice(inner[0], inner[0] + width)
-    labels[box_rows, box_columns] = cv2.GC_PR_FGD
-    ellipse = np.zeros_like(labels)
-    centre = (inner[0] + width // 2, inner[1] + height // 2)
-    cv2.ellipse(ellipse, centre, (max(1, width // 2), max(1, height // 2)), 0.0, 0.0, 360.0, 1, -1)
-    found = ellipse
-    if (labels == cv2.GC_BGD).any():  # else the box fills the image, and there is nothing to tell it from
-        cv2.setRNGSeed(0)  # GrabCut begins with k-means
-        cv2.grabCut(part, labels, inner, np.zeros((1, 65)), np.zeros((1, 65)), 4, cv2.GC_INIT_WITH_MASK)
-        cut = ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).view(np.uint8)
-        if cv2.countNonZero(cut) > 0.25 * width * height:
-            found = cut
-    mask = np.zeros(rgb.shape[:2], np.bool_)
-    mask[rows, columns] = found > 0
-    return mask
 
 
 def _bins(part: ImageArray) -> np.ndarray:

@@ -69,7 +69,7 @@ def box_from_pixel(rgb: ImageArray, pixel: tuple[float, float]) -> FloatArray:
 
 
 def cut_out(rgb: ImageArray, box: tuple[int, int, int, int], surroundings: float) -> MaskArray:
-    """The thing in a box, shape (H, W), by GrabCut (Rother et al. 2004); where nothing stands out, what the box holds.
+    """The thing in a box, shape (H, W), by GrabCut (Rother et al. 2004); or the ellipse in the box.
 
     Args:
         rgb: image.

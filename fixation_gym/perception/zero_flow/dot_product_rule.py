@@ -5,7 +5,7 @@ fixated object towards the image border and with forward motion. Kept for compar
 
 The rule knows no depth and no table, but who keeps what was seen needs the former and a robot over a table the latter.
 So ``rule_answers`` takes the side from the rule and leaves to the exact test what is not about the side: which pixels
-have evidence, what moves by itself, and what is too low to be told from the table, which is a question of height.
+have evidence, what moves by itself, and what is too low to stand out from the table, which is a question of height.
 """
 
 from __future__ import annotations
