@@ -10,10 +10,11 @@ from typing import Any
 
 from fixation_gym.envs.config import CONTROL_FREQUENCY
 from fixation_gym.evaluation import workers
-from fixation_gym.evaluation.files import write_json
+from fixation_gym.evaluation.files import write_file, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import EPISODES_FILE, SUMMARY_FILE, ResultStore
+from fixation_gym.export.card import CARD_FILE, dataset_card
 from fixation_gym.export.config import ExportConfig
 from fixation_gym.export.recording import Recorded, record
 
@@ -60,6 +61,7 @@ def export(config: ExportConfig, out: Path) -> dict[str, Any]:
             "versions": description["versions"],
             "commit": source_commit(),
         }
+        write_file(out / CARD_FILE, dataset_card(config, episodes, summary).encode())
         write_json(out / SUMMARY_FILE, summary)
     return summary
 

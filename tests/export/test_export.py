@@ -96,6 +96,20 @@ def test_meta_data_describe_the_columns_the_episodes_and_the_videos(dataset):
 
 
 @pytest.mark.sim
+def test_the_card_says_what_was_recorded_and_how(dataset):
+    card = (dataset / "README.md").read_text()
+    summary = json.loads((dataset / "summary.json").read_text())
+    header, text = card.removeprefix("---\n").split("\n---\n")
+    assert "- LeRobot" in header.splitlines()
+    assert "# 2 episodes of `servo`" in text
+    assert f"- Picked: {summary['successes']} of 2" in text
+    assert f"Frames: {summary['frames']} at 25 Hz; pictures of 80x64 px" in text
+    assert "| `clear` | 2 |" in text
+    assert f"mujoco {summary['versions']['mujoco']}" in text
+    assert all(f"`{name}`" in text for name in (*NAMES, *VIDEOS))
+
+
+@pytest.mark.sim
 def test_more_episodes_come_after_those_that_are_there(dataset):
     from fixation_gym.export.run import export
 
