@@ -4,7 +4,7 @@
 VENV := .venv/bin
 ARGS :=
 
-.PHONY: demo test test-core test-newest clients lint evaluate golden bench soak kills full_disk doctor core full lock clean
+.PHONY: demo test test-core test-newest clients lint docs evaluate golden bench soak kills full_disk doctor core full lock clean
 
 demo: core
 	$(VENV)/fixation-gym demo $(ARGS)
@@ -29,6 +29,11 @@ lint: full
 	$(VENV)/ruff check .
 	$(VENV)/ruff format --check .
 	$(VENV)/pyright
+
+# The documentation site, in out/site/index.html; a link or a name that leads nowhere is an error.
+docs: core
+	$(VENV)/uv pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(VENV)/mkdocs build --quiet
 
 evaluate: core
 	$(VENV)/fixation-gym evaluate $(ARGS)
@@ -59,7 +64,7 @@ core full:
 lock: full
 	cp constraints.txt constraints.tmp || true
 	sed -n 's/^TORCH_VERSION=/torch==/p' scripts/bootstrap.sh | $(VENV)/uv pip compile pyproject.toml --constraint - \
-	    --universal --python-version 3.10 --extra rl --extra export --extra ros --extra viz --extra cluster --extra bench --extra dev --no-emit-package setuptools \
+	    --universal --python-version 3.10 --extra rl --extra export --extra ros --extra viz --extra cluster --extra bench --extra docs --extra dev --no-emit-package setuptools \
 	    --no-annotate --no-header --quiet --output-file constraints.tmp >/dev/null
 	{ echo "# All versions, for Python 3.10 to 3.12 and every extra. Regenerate with: make lock"; \
 	  grep -v -e "'never'" -e '^#' constraints.tmp; } >constraints.txt
