@@ -20,3 +20,19 @@ def test_every_page_of_the_site_is_in_its_navigation():
     configuration = (ROOT / "mkdocs.yml").read_text()
     pages = {str(page.relative_to(ROOT / "docs")) for page in (ROOT / "docs").glob("**/*.md")}
     assert pages == set(re.findall(r": (\S+\.md)$", configuration, re.MULTILINE))
+
+
+def test_the_theory_page_agrees_with_the_code_in_every_sign():
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "theory.md").read_text(), re.DOTALL)
+    assert sum(block.count("assert") for block in blocks) >= 12
+    exec(compile("\n".join(blocks), "theory.md", "exec"), {"__name__": "theory"})
+
+
+def test_the_figures_of_the_theory_are_drawn_from_the_code(tmp_path):
+    names = {"__name__": "theory_figures", "__file__": str(ROOT / "scripts" / "theory_figures.py")}
+    exec(compile((ROOT / "scripts" / "theory_figures.py").read_text(), names["__file__"], "exec"), names)
+    names["main"](tmp_path)
+    drawn = {path.name for path in tmp_path.iterdir()}
+    assert drawn == {f"{name}.svg" for name in names["FIGURES"]}
+    pages = "".join(page.read_text() for page in (ROOT / "docs").glob("*.md"))
+    assert all(f"images/{name}" in pages for name in drawn)
