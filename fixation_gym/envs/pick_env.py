@@ -58,7 +58,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     unless ``reward_weights`` say otherwise; ``"sparse"``: +1 on success, -1 for the first collision. The terms,
     ``progress``, ``time``, ``success`` and ``collision``, are in ``info["reward_terms"]`` and sum to the reward.
 
-    **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.50 m away,
+    **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.49 m away,
     looking within 9 cm of it; of two red objects the target is the one nearer to the first image's centre.
     **End** ``terminated`` on success: target 0.1 m above its resting height for 0.5 s. Time-outs are ``truncated`` by
     the spec's ``max_episode_steps``: 625, which is 25 s at 25 Hz.
