@@ -36,3 +36,16 @@ def test_the_figures_of_the_theory_are_drawn_from_the_code(tmp_path):
     assert drawn == {f"{name}.svg" for name in names["FIGURES"]}
     pages = "".join(page.read_text() for page in (ROOT / "docs").glob("*.md"))
     assert all(f"images/{name}" in pages for name in drawn)
+
+
+def test_version_and_paper_are_the_same_in_every_file_that_names_them():
+    version = re.search(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)[1]
+    citation, page = (ROOT / "CITATION.cff").read_text(), (ROOT / "docs" / "citing.md").read_text()
+    assert f"\nversion: {version}\n" in citation
+    assert f"version = {{{version}}}" in page
+    (doi,) = re.findall(r"doi: (\S+)", citation)
+    assert doi in page
+
+
+def test_the_packages_say_that_they_are_typed():
+    assert all((ROOT / folder / "py.typed").exists() for folder in ("fixation_gym", "policies/fixation_policies"))
