@@ -1,4 +1,4 @@
-"""Many scenes on one sheet, seen from the front: what the scenarios are like."""
+"""Many scenes on one sheet, seen from the front: ``06_contact_sheet.py scenes.jpg``, or three of each that is named."""
 
 import sys
 from collections.abc import Sequence
@@ -45,4 +45,5 @@ def main(path: str = "scenes.jpg", scenarios: Sequence[str] = SCENARIOS, scenes:
 
 
 if __name__ == "__main__":
-    print(main(sys.argv[1]) if len(sys.argv) > 1 else main())
+    sheet_path, *names = sys.argv[1:] or ["scenes.jpg"]
+    print(main(sheet_path, names, scenes=3) if names else main(sheet_path))

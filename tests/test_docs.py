@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from fixation_gym.envs.config import SCENARIO_NAMES
+
 ROOT = Path(__file__).parent.parent
 OUTSIDE_THE_SITE = [ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("policies/**/*.md")]
 
@@ -49,3 +51,11 @@ def test_version_and_paper_are_the_same_in_every_file_that_names_them():
 
 def test_the_packages_say_that_they_are_typed():
     assert all((ROOT / folder / "py.typed").exists() for folder in ("fixation_gym", "policies/fixation_policies"))
+
+
+def test_every_scenario_has_its_picture_on_the_page_of_scenarios():
+    page = (ROOT / "docs" / "scenarios.md").read_text()
+    assert sorted(re.findall(r"^### `(\w+)`$", page, re.MULTILINE)) == sorted(SCENARIO_NAMES)
+    pictures = [ROOT / "docs" / "images" / "scenarios" / f"{name}.jpg" for name in SCENARIO_NAMES]
+    assert all(f"(images/scenarios/{picture.name})" in page for picture in pictures)
+    assert sum(picture.stat().st_size for picture in pictures) < 2e6
