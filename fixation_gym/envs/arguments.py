@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from fixation_gym.envs.object_pool import SLOTS
+from fixation_gym.envs.pool_slots import fits_pool
+from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
@@ -52,6 +55,23 @@ def require_choice(name: str, value: Any, allowed: tuple[str | None, ...]) -> No
     """
     if not (value is None or isinstance(value, str)) or value not in allowed:
         raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
+
+
+def checked_scene(options: dict[str, Any] | None) -> SceneSpec | None:
+    """The scene among the options of a reset; None if there is none, and one is to be drawn.
+
+    Raises:
+        ValueError: if it is no scene, or the pool of bodies has no room for its obstacles.
+    """
+    scene = (options or {}).get("scene")
+    if scene is None:
+        return None
+    if not isinstance(scene, SceneSpec):
+        raise ValueError(f'options["scene"] must be a fixation_gym.envs.scene.SceneSpec, got {type(scene).__name__}')
+    if not fits_pool(scene.obstacles):
+        parts = [len(obstacle.shape.parts) for obstacle in scene.obstacles]
+        raise ValueError(f"obstacles may have {', '.join(map(str, SLOTS))} parts, in any order, got {parts}")
+    return scene
 
 
 def checked_action(action: Any, size: int) -> FloatArray:

@@ -140,11 +140,12 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Draw a new scene. ``options`` are not used."""
+        """Draw a new scene, or take ``options["scene"]``, a ``SceneSpec``; ``checked_scene`` says what is refused."""
+        given = arguments.checked_scene(options)
         super().reset(seed=seed)
         # Noise has a generator of its own: scenes depend on the seed alone, not on how long earlier episodes were.
         self._noise_rng = self.np_random.spawn(1)[0]
-        self.scene = sample_scene(self.scenario, self.np_random)
+        self.scene = given or sample_scene(self.scenario, self.np_random)
         self._errors = sensors.draw_episode_errors(self.noise, self._noise_rng)
         self.sim.reset(self.scene)
         self._running = True

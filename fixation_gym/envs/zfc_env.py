@@ -127,7 +127,7 @@ class FixationPickZFC(FixationPickEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Draw a new scene. ``options`` are not used."""
+        """Draw a new scene, or take that of the options: see ``FixationPickEnv.reset``."""
         self._truth = None
         sensed, info = super().reset(seed=seed, options=options)
         self._fixator.reset()
