@@ -23,7 +23,7 @@ class Observation:
     """One synchronised reading of camera and joints.
 
     Frames: ``base`` is the robot's base link; ``cam`` is the optical frame of the wrist camera (x right, y down,
-    z forward). All values belong to the same instant ``time``.
+    z forward). All values belong to the same instant ``time``, but for an image with an ``image_time``.
     """
 
     time: float
@@ -45,6 +45,8 @@ class Observation:
     """Which thing is the target: x, y, width, height of a box around it in the first image, px, shape (4,)."""
     mask: MaskArray | None = None
     """Pixels of the target, shape (H, W), where somebody else finds it."""
+    image_time: float | None = None
+    """When the image was taken, as its stamp says, s; None: at ``time``."""
 
     @classmethod
     def of_camera(
@@ -82,6 +84,7 @@ class Observation:
             rgb=rgb,
             gripper_width=float(_numbers(obs, "gripper_width", 1)[0]),
             target_box=_numbers(obs, "target_box", 4) if "target_box" in obs else None,
+            image_time=float(_numbers(obs, "image_time", 1)[0]) if "image_time" in obs else None,
             mask=None if mask is None else mask.astype(np.bool_),
             **vectors,
         )

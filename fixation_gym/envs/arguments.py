@@ -15,6 +15,8 @@ from fixation_gym.types import FloatArray
 
 WIDEST = 1.25 * ROBOT.hand.opening
 """Bound of the measured opening between the finger pads, m."""
+_LONGEST_DELAY = 10.0
+"""Age of the first image, at most, s."""
 FREQUENCIES = (10, 20, 25, 50, 100)
 """Control steps per second that whole physics steps allow."""
 
@@ -87,6 +89,17 @@ def checked_action(action: Any, size: int) -> FloatArray:
     return np.minimum(np.maximum(values, -1.0), 1.0)  # several times as fast as np.clip on a few numbers
 
 
+def limits(space: spaces.Dict) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Lowest and highest values of all vectors and images of a space."""
+    return {key: (box.low, box.high) for key, box in space.items() if isinstance(box, spaces.Box)}
+
+
+def within(vectors: dict[str, Any], bounds: dict[str, tuple[FloatArray, FloatArray]]) -> dict[str, FloatArray]:
+    """Vectors as float32, within their bounds."""
+    pairs = ((key, value, *bounds[key]) for key, value in vectors.items())
+    return {key: np.minimum(np.maximum(value, low), high).astype(np.float32) for key, value, low, high in pairs}
+
+
 def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
     """Observation space of ``FixationPick-v0`` with a wrist image of that size, or without; units as in its table."""
 
@@ -98,6 +111,7 @@ def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
     if image_size is not None:
         height, width = image_size
         image["rgb"] = spaces.Box(0, 255, (height, width, 3), np.uint8)
+        image["image_time"] = spaces.Box(-_LONGEST_DELAY, 3600.0, (1,), np.float32)
         image["target_box"] = spaces.Box(0.0, np.array([width, height] * 2, np.float32), dtype=np.float32)
     return spaces.Dict(
         image

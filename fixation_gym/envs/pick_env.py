@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from fixation_gym.envs import arguments, config, rewards, sensors
+from fixation_gym.envs import arguments, config, rewards, sensors, wrist_camera
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
+from fixation_gym.envs.sensor_noise import SensorNoise, resolve_sensor_noise
 from fixation_gym.envs.state import Resumable
-from fixation_gym.envs.target_box import target_box
+from fixation_gym.envs.target_box import target_box, target_sight
 from fixation_gym.envs.views import Views, overlay
-from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose
 from fixation_gym.perception.percept import Percept
+from fixation_gym.perception.rectification import undistorted
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
 
@@ -26,8 +28,9 @@ if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
 
 RENDER_VIEWS = ("wrist", "front", "overlay")
-_EPISODE = ("scene", "percept", "camera_on", "_np_random", "_np_random_seed", "_noise_rng", "_errors")
-_EPISODE += ("_steps", "_steps_lifted", "_collided", "_target_box", "_state", "_arm", "_observation", "_last_rgb")
+_EPISODE = ("scene", "percept", "camera_on", "_np_random", "_np_random_seed", "_noise_rng", "_errors", "_camera")
+_EPISODE += ("_steps", "_steps_lifted", "_collided", "_target_box", "_state", "_arm", "_observation")
+_EPISODE += ("_last_rgb", "_image_time")
 """What changes in an episode beside the simulation."""
 
 
@@ -42,11 +45,13 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     | 3-5 | camera rotation rate w_X, w_Y, w_Z in the camera frame | 0.8 rad/s |
     | 6 | gripper: below 0 opens, above 0 closes, 0 holds | - |
 
-    **Observation** ``Dict`` with one time stamp; vectors are float32. A noise preset may make the image a few ms older.
+    **Observation** ``Dict``; vectors are float32. All but the image is of ``time``; so is the image, unless
+    ``sensor_noise`` gives the camera a delay or a clock of its own.
 
     | key | shape | meaning |
     |---|---|---|
     | ``rgb`` | (H, W, 3) uint8 | wrist image, top-left origin |
+    | ``image_time`` | (1,) | when that was taken, s since reset, as the camera's stamp says |
     | ``joint_pos``, ``joint_vel`` | (7,) | arm joints, rad and rad/s |
     | ``gripper_width`` | (1,) | opening between the finger pads, m |
     | ``camera_pose`` | (7,) | position in m and quaternion (w, x, y, z) of the camera in the robot base frame |
@@ -76,7 +81,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self,
         scenario: str | Mapping[str, Any] = "clear",
         image_size: tuple[int, int] | None = config.IMAGE_SIZE,
-        sensor_noise: str = "nominal",
+        sensor_noise: str | Mapping[str, Any] | SensorNoise = "nominal",
         control_frequency: int = config.CONTROL_FREQUENCY,
         render_mode: str | None = None,
         render_view: str = "front",
@@ -88,7 +93,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         Args:
             scenario: name from ``config.SCENARIO_NAMES`` or a mapping of ``config.Scenario`` fields.
             image_size: (height, width) of the wrist image, px; None for observations without ``rgb``.
-            sensor_noise: "ideal", "nominal" or "conservative".
+            sensor_noise: name from ``sensor_noise.SENSOR_NOISE`` or a mapping of ``SensorNoise`` fields.
             control_frequency: steps per second: 10, 20, 25, 50 or 100.
             render_mode: None, "rgb_array" or "human" (MuJoCo's viewer; needs a display).
             render_view: of "rgb_array": "wrist", "front" or "overlay" (both, annotated with the ``percept`` that who
@@ -101,7 +106,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             ValueError: for a value that is not allowed; the message says what is.
         """
         self.scenario = config.resolve_scenario(scenario)
-        self.noise = config.resolve_sensor_noise(sensor_noise)
+        self.noise = resolve_sensor_noise(sensor_noise)
         self._image_size = arguments.checked_image_size(image_size)
         control_frequency = arguments.checked_frequency(control_frequency)
         arguments.require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
@@ -111,27 +116,27 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self.render_mode, self.render_view = render_mode, render_view
         self._arguments: dict[str, Any] = {
             "image_size": self._image_size,
-            "sensor_noise": sensor_noise,
+            "sensor_noise": sensor_noise if isinstance(sensor_noise, str) else self.noise,
             "control_frequency": control_frequency,
             "reward": reward,
             "reward_weights": rewards.resolve_weights(reward_weights or {}) if reward == "dense" else None,
         }
         self.metadata = self.metadata | {"render_fps": control_frequency}
-        self.intrinsics = Intrinsics.from_fovy(*(self._image_size or config.IMAGE_SIZE), ROBOT.camera.fovy)
+        self.intrinsics = wrist_camera.intrinsics_of(self._image_size or config.IMAGE_SIZE, self.noise)
         self.hand_eye = ROBOT.camera.hand_eye
         self.control_frequency = control_frequency
         self._reward_terms = rewards.choose_terms(reward, reward_weights)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
         self.observation_space = arguments.observation_space(self._image_size)
-        boxes = ((key, box) for key, box in self.observation_space.items() if isinstance(box, spaces.Box))
-        self._limits = {key: (box.low, box.high) for key, box in boxes}
+        self._limits = arguments.limits(self.observation_space)
         self._running = False
         self._sim: PickSim | None = None
-        self._views = Views((self.intrinsics.height, self.intrinsics.width))
+        self._views = Views(self.intrinsics)
         self.percept: Percept | None = None
         """What whoever acts perceived in the last observation, if it says so: drawn into the overlay."""
         self.scene: SceneSpec | None = None
         self._last_rgb: ImageArray = np.zeros((0, 0, 3), np.uint8)
+        self._image_time = 0.0
         self.camera_on = True
         """While False, steps render nothing, and the last image and percept stay: for training, in grasps."""
 
@@ -155,7 +160,8 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self.camera_on = True
         self._target_box = target_box(self.scene.target, self.sim.arm_state().camera_pose, self.intrinsics)
         self._state = self._task_state()
-        observation = self._observe(self.sim.data.qpos)
+        self._camera = wrist_camera.switched_on(self.noise, self.data.qpos, self.model.opt.timestep, self._noise_rng)
+        observation = self._observe()
         if self.render_mode == "human":
             self.render()
         terms = dict.fromkeys(self._reward_terms(self._state, self._state), 0.0)
@@ -171,14 +177,14 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         action = arguments.checked_action(action, 7)
         self._require_reset()
         sim = self.sim
-        latency = round(self.noise.image_latency_s / sim.model.opt.timestep)
-        exposed, hit = sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]), sim.substeps - latency)
+        path, hit = sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]))
+        self._camera = wrist_camera.moved_on(self._camera, self.noise, path, self._noise_rng)
         self._steps += 1
         self._collided = self._collided or hit or sim.obstacle_push() > config.COLLISION_PUSH
         self._steps_lifted = self._steps_lifted + 1 if sim.target_rise() >= config.LIFT_HEIGHT else 0
         before, self._state = self._state, self._task_state()
         terms = self._reward_terms(before, self._state)
-        observation = self._observe(exposed)
+        observation = self._observe()
         if self.render_mode == "human":
             self.render()
         return observation, float(sum(terms.values())), self._state.success, False, self._info(terms)
@@ -193,8 +199,9 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             self._views.show(self.sim)
             return None
         shows_overlay = self.render_view == "overlay"
-        shown = self._image("front" if shows_overlay else self.render_view, self.sim.data.qpos)
-        return overlay(self._last_rgb, self.percept, shown) if shows_overlay else shown
+        view = self._views.view("front" if shows_overlay else self.render_view, self.sim)
+        shown = view.render(self.sim.data.qpos, with_reflections=self.sim.has_mirror)
+        return overlay(undistorted(self._last_rgb, self.intrinsics), self.percept, shown) if shows_overlay else shown
 
     def close(self) -> None:
         """Free GL contexts, windows and the simulation; may be called twice. A reset builds them again."""
@@ -231,6 +238,11 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         return self._sim
 
     @property
+    def picture_qpos(self) -> FloatArray:
+        """Configuration of the simulation at the stamp of the newest picture."""
+        return wrist_camera.configuration_at(self._camera, self._image_time)
+
+    @property
     def model(self) -> Any:
         """Compiled ``mjModel``."""
         return self.sim.model
@@ -247,13 +259,14 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
 
     # -- pieces --------------------------------------------------------------------------------------------------
 
-    def _observe(self, exposed_qpos: FloatArray) -> dict[str, Any]:
+    def _observe(self) -> dict[str, Any]:
         self._arm = state = self.sim.arm_state()
         observation: dict[str, Any] = {}
-        if self._image_size is not None and self.camera_on:
-            image = self._image("observation", exposed_qpos)
-            self._last_rgb = sensors.measure_image(image, self.noise, self._errors.exposure, self._noise_rng)
         if self._image_size is not None:
+            if self.camera_on and self._camera.fresh:
+                light, exposure = partial(self._views.light, self.sim), self._errors.exposure
+                self._last_rgb = wrist_camera.picture(self._camera, self.noise, exposure, light, self._noise_rng)
+                self._image_time = self._camera.stamp_s
             observation["rgb"] = self._last_rgb.copy()
             observation["target_box"] = self._target_box.astype(np.float32)
         joint_pos, joint_vel, pose, twist = sensors.measure_arm(state, self.noise, self._errors, self._noise_rng)
@@ -264,17 +277,10 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             "camera_pose": matrix_to_pose(pose),
             "camera_twist": twist,
             "time": [self._steps / self.control_frequency],
+            **({} if self._image_size is None else {"image_time": [self._image_time]}),
         }
-        for key, value in vectors.items():
-            low, high = self._limits[key]
-            observation[key] = np.minimum(np.maximum(value, low), high).astype(np.float32)
-        self._observation = observation
-        return observation
-
-    def _image(self, view: str, qpos: FloatArray) -> ImageArray:
-        """Render one of the views "observation", "wrist" and "front"."""
-        mirror = self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
-        return self._views.view(view, self.sim).render(qpos, with_reflections=mirror)
+        self._observation = {**observation, **arguments.within(vectors, self._limits)}
+        return self._observation
 
     def _task_state(self) -> rewards.TaskState:
         distance = math.dist(self.sim.body_position("target"), self.sim.tool_position())
@@ -282,17 +288,14 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         return rewards.TaskState(distance, self.sim.target_rise(), held, self._collided)
 
     def _info(self, terms: dict[str, float]) -> dict[str, Any]:
-        pose = self._arm.camera_pose
-        x, y, z = (pose[:3, :3].T @ (self.sim.body_position("target") - pose[:3, 3])).tolist()
-        camera = self.intrinsics
-        offset = math.hypot(camera.fx * x / z, camera.fy * y / z) if z > 0.0 else math.nan
+        depth, offset = target_sight(self._arm.camera_pose, self.sim.body_position("target"), self.intrinsics)
         # NumPy's scalars: some libraries ask every value for its dtype.
         return {
             "is_success": np.bool_(self._state.success),
             "success": np.bool_(self._state.success),
             "collision": np.bool_(self._state.collision),
             "clearance_m": np.float64(self.sim.clearance()),
-            "distance_true_m": np.float64(z),
+            "distance_true_m": np.float64(depth),
             "fixation_error_px": np.float64(offset),
             "reward_terms": terms,
         }

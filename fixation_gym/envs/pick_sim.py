@@ -187,24 +187,24 @@ class PickSim:
             joints = np.clip(joints + step, limits.lower, limits.upper)
         return joints, left
 
-    def step(self, camera_twist: FloatArray, gripper: float, exposure_substep: int) -> tuple[FloatArray, bool]:
+    def step(self, camera_twist: FloatArray, gripper: float) -> tuple[FloatArray, bool]:
         """Run one control period.
 
         Args:
             camera_twist: desired twist [v, w] in ``cam``, shape (6,), m/s and rad/s, held in ``cam`` for the period.
             gripper: -1 opens, +1 closes.
-            exposure_substep: substep after which the image is taken.
 
         Returns:
-            qpos at the exposure, and whether the robot hit an obstacle or the table.
+            qpos after every physics step, for images taken meanwhile, shape (substeps, nq), and whether the robot hit
+            an obstacle or the table.
         """
         model, data = self.model, self.data
         finger_step = ROBOT.hand.finger_speed * model.opt.timestep * float(np.sign(gripper))
         arm, torques, fingers = self._arm_dynamics, data.ctrl[self._arm], data.ctrl[self._fingers]
         finger, movers = float(fingers[0]), self._movers
         collided = False
-        exposed = data.qpos.copy()
-        for substep in range(1, self.substeps + 1):
+        path = np.empty((self.substeps, model.nq))
+        for substep in range(self.substeps):
             for mover in movers:
                 mover.apply()
             mujoco.mj_step1(model, data)
@@ -215,11 +215,10 @@ class PickSim:
             mujoco.mj_step2(model, data)
             if not collided:
                 collided = contacts.robot_hits(model, data, self._compiled.owners)
-            if substep == exposure_substep:
-                exposed = data.qpos.copy()
+            path[substep] = data.qpos
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        return exposed, collided
+        return path, collided
 
     def get_state(self) -> SimState:
         """What its future depends on; call it after a reset."""
@@ -247,6 +246,11 @@ class PickSim:
             self._display = model, SceneLoader(model)
             self._display[1].load(self._scene)
         return self._display[0]
+
+    @property
+    def has_mirror(self) -> bool:
+        """Whether pictures show reflections."""
+        return any(obstacle.kind == "mirror" for obstacle in self._scene.obstacles)
 
     # -- truth ---------------------------------------------------------------------------------------------------
 

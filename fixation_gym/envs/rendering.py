@@ -29,7 +29,15 @@ class View:
     """
 
     def __init__(
-        self, model: Any, camera: str, height: int, width: int, *, full_quality: bool, supersampling: int = 2
+        self,
+        model: Any,
+        camera: str,
+        height: int,
+        width: int,
+        *,
+        full_quality: bool,
+        supersampling: int = 2,
+        fovy: float | None = None,
     ) -> None:
         """Open a GL context.
 
@@ -41,6 +49,7 @@ class View:
             full_quality: with robot and shadows, for people; otherwise what the wrist camera needs.
             supersampling: pixels rendered per pixel of the image along each side, without ``full_quality``; 1 is faster
                 and enough where all edges of interest are inside textures.
+            fovy: vertical field of view, rad; None: that of the camera in the model.
 
         Raises:
             RuntimeError: in a process forked from one that has rendered, where GL would wait for ever.
@@ -72,7 +81,8 @@ class View:
         self._option.geomgroup[scene_mjcf.VISIBLE_GROUP] = 1
         self._full_quality = full_quality
         self._camera_id = model.camera(camera).id
-        self._border = _border_rays(math.radians(model.cam_fovy[self._camera_id]), width / height)
+        self._fovy_deg = float(model.cam_fovy[self._camera_id]) if fovy is None else math.degrees(fovy)
+        self._border = _border_rays(math.radians(self._fovy_deg), width / height)
 
     @property
     def renderer(self) -> Offscreen:
@@ -89,7 +99,9 @@ class View:
         # The robot is behind its wrist camera; only a mirror shows it, where a coarse one does.
         self._option.geomgroup[scene_mjcf.ROBOT_GROUP] = int(self._full_quality)
         self._option.geomgroup[scene_mjcf.STAND_IN_GROUP] = int(with_reflections and not self._full_quality)
+        own, self._model.cam_fovy[self._camera_id] = self._model.cam_fovy[self._camera_id], self._fovy_deg
         self._renderer.update_scene(self._data, self._camera, self._option)
+        self._model.cam_fovy[self._camera_id] = own  # the model is shared by all views
         flags = self._renderer.scene.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW] = int(self._full_quality)
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = int(with_reflections)

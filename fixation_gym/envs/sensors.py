@@ -1,4 +1,4 @@
-"""What the robot measures of the true state: encoder, hand-eye and camera errors (presets in ``config``)."""
+"""What the robot measures of the true state: encoder, hand-eye and camera errors (presets in ``sensor_noise``)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from fixation_gym.envs.config import SensorNoise
+from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.geometry.rigid import inverse
 from fixation_gym.geometry.twist import adjoint
+from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ class EpisodeErrors:
     """Matrix, shape (6, 6), that turns a twist of the true camera frame into the believed one's."""
     exposure: float
     """Factor on every grey level."""
+    joints: FloatArray | float = 0.0
+    """Of the joint angles, shape (n,), rad."""
 
 
 def draw_episode_errors(noise: SensorNoise, rng: np.random.Generator) -> EpisodeErrors:
@@ -40,7 +43,8 @@ def draw_episode_errors(noise: SensorNoise, rng: np.random.Generator) -> Episode
     T_true_believed = np.eye(4)
     T_true_believed[:3, :3] = _small_rotation(hand_eye[3:])
     T_true_believed[:3, 3] = hand_eye[:3]
-    return EpisodeErrors(hand_eye, adjoint(inverse(T_true_believed)), float(max(0.2, exposure)))
+    joints = noise.joint_bias_rad * rng.standard_normal(ROBOT.arm.joints) if noise.joint_bias_rad else 0.0
+    return EpisodeErrors(hand_eye, adjoint(inverse(T_true_believed)), float(max(0.2, exposure)), joints)
 
 
 def measure_joints(
@@ -77,6 +81,7 @@ def measure_arm(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Joint angles and rates, rad and rad/s, and the camera's pose (4, 4) and twist (6,) that follow from them."""
     joint_pos, joint_vel = measure_joints(arm.joint_pos, arm.joint_vel, noise, rng)
+    joint_pos = joint_pos + errors.joints
     pose = measure_camera_pose(arm.camera_pose, arm.jacobian, joint_pos - arm.joint_pos, errors.hand_eye)
     return joint_pos, joint_vel, pose, measure_camera_twist(arm.jacobian, joint_vel, errors)
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fixation_gym.envs.lens import bent_box
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.scene import TargetSpec
 from fixation_gym.envs.shapes import Part
@@ -23,8 +24,8 @@ def target_box(target: TargetSpec, T_base_cam: FloatArray, intrinsics: Intrinsic
         intrinsics: of the picture.
 
     Returns:
-        x, y of the top-left corner, width and height, shape (4,), px of whole pixels within the picture; all 0 if the
-        target is not in it.
+        x, y of the top-left corner, width and height, shape (4,), px of whole pixels within the picture, as its lens
+        shows it; all 0 if the target is not in it.
     """
     points = transform(inverse(T_base_cam), _surface(target))
     pixels = intrinsics.project(points[points[:, 2] > 0.01])
@@ -33,7 +34,13 @@ def target_box(target: TargetSpec, T_base_cam: FloatArray, intrinsics: Intrinsic
     size = np.array([intrinsics.width, intrinsics.height])
     low = np.clip(np.floor(pixels.min(axis=0) + 0.5), 0, size)
     high = np.clip(np.floor(pixels.max(axis=0) + 0.5) + 1, 0, size)
-    return np.concatenate([low, high - low]) if np.all(high > low) else np.zeros(4)
+    return bent_box(np.concatenate([low, high - low]), intrinsics) if np.all(high > low) else np.zeros(4)
+
+
+def target_sight(T_base_cam: FloatArray, centre: FloatArray, intrinsics: Intrinsics) -> tuple[float, float]:
+    """Depth of the target's centre, shape (3,) in base, m, and its offset from the optical axis, px; NaN behind it."""
+    x, y, z = (T_base_cam[:3, :3].T @ (centre - T_base_cam[:3, 3])).tolist()
+    return z, math.hypot(intrinsics.fx * x / z, intrinsics.fy * y / z) if z > 0.0 else math.nan
 
 
 def _surface(target: TargetSpec) -> FloatArray:

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fixation_gym.envs.lens import through_lens, wide_pinhole
+from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.percept import Percept
-from fixation_gym.types import ImageArray
+from fixation_gym.types import FloatArray, ImageArray
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
@@ -18,11 +20,14 @@ _FRONT_SIZE = (360, 480)
 
 
 class Views:
-    """Views "observation", "wrist" and "front" and a window on a simulation, each opened at first use."""
+    """Views "observation", "wide", "wrist" and "front" and a window on a simulation, each opened at first use.
 
-    def __init__(self, size: tuple[int, int]) -> None:
-        """Note the (height, width) of the wrist image, px; opens nothing."""
-        self._size = size
+    "wide" is what the wrist camera's lens sees, which may be more than its pinhole.
+    """
+
+    def __init__(self, camera: Intrinsics) -> None:
+        """Note the wrist camera; opens nothing."""
+        self._camera = camera
         self._views: dict[str, View] = {}
         self._window: Window | None = None
 
@@ -31,12 +36,20 @@ class Views:
         if name not in self._views:
             from fixation_gym.envs.rendering import View
 
-            size = _FRONT_SIZE if name == "front" else self._size
+            pinhole = wide_pinhole(self._camera) if name == "wide" else self._camera
+            size = _FRONT_SIZE if name == "front" else (pinhole.height, pinhole.width)
             camera = "front" if name == "front" else "wrist"
-            for_people = name != "observation"
+            for_people = name in ("wrist", "front")
             model = sim.display_model if for_people else sim.model
-            self._views[name] = View(model, camera, *size, full_quality=for_people)
+            fovy = pinhole.fovy if name == "wide" else None
+            self._views[name] = View(model, camera, *size, full_quality=for_people, fovy=fovy)
         return self._views[name]
+
+    def light(self, sim: PickSim, qpos: FloatArray) -> ImageArray:
+        """What the wrist camera would see of a configuration at rest, through its lens, shape (H, W, 3)."""
+        if self._camera.lens is None:
+            return self.view("observation", sim).render(qpos, with_reflections=sim.has_mirror)
+        return through_lens(self.view("wide", sim).render(qpos, with_reflections=sim.has_mirror), self._camera)
 
     def show(self, sim: PickSim) -> None:
         """Show the current state in the window."""

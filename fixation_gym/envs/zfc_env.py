@@ -14,6 +14,7 @@ from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE
 from fixation_gym.envs.perceiving import perception_for
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.rewards import RewardWeights
+from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.envs.zfc_observation import (
     OBSERVATIONS,
     fixation_vector,
@@ -81,7 +82,7 @@ class FixationPickZFC(FixationPickEnv):
         scenario: str | Mapping[str, Any] = "clear",
         observation: str = "zfc",
         image_size: tuple[int, int] = IMAGE_SIZE,
-        sensor_noise: str = "nominal",
+        sensor_noise: str | Mapping[str, Any] | SensorNoise = "nominal",
         control_frequency: int = CONTROL_FREQUENCY,
         render_mode: str | None = None,
         render_view: str = "front",
@@ -94,7 +95,7 @@ class FixationPickZFC(FixationPickEnv):
             scenario: as in ``FixationPickEnv``, like all that follow but for two:
             observation: "zfc", "blind", "rgb" or "privileged".
             image_size: (height, width) of the wrist image, px; may not be None, for perception works on it.
-            sensor_noise: "ideal", "nominal" or "conservative".
+            sensor_noise: name from ``sensor_noise.SENSOR_NOISE`` or a mapping of ``SensorNoise`` fields.
             control_frequency: steps per second.
             render_mode: None, "rgb_array" or "human".
             render_view: of "rgb_array".

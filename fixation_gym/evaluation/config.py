@@ -41,7 +41,7 @@ class EvaluationConfig:
     seed: int = 0
     """Chooses the block of episode seeds: episode i has seed 100000 * SEED + i in every scenario."""
     sensor_noise: str = "nominal"
-    """ideal, nominal or conservative."""
+    """ideal, nominal, conservative or realistic."""
     image_size: tuple[int, int] | None = None
     """Height and width of the wrist image, px; 240 320 by default, for an agent those of its training."""
     workers: int = 1
@@ -55,7 +55,7 @@ class EvaluationConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SENSOR_NOISE
+        from fixation_gym.envs.sensor_noise import SENSOR_NOISE
         from fixation_gym.evaluation.workers import check_backend
         from fixation_policies.catalogue import check_detector, check_policy
 

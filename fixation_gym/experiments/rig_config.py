@@ -32,10 +32,11 @@ class RigConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SENSOR_NOISE
+        from fixation_gym.envs.sensor_noise import SENSOR_NOISE
         from fixation_gym.evaluation.workers import check_backend
 
-        check_names([self.noise], SENSOR_NOISE, "sensor noise")
+        rigs = [name for name, noise in SENSOR_NOISE.items() if noise.of_every_rig]
+        check_names([self.noise], rigs, "sensor noise")
         check_seed(self.seed)
         if not 1 <= self.repetitions <= SEED_BLOCK:
             raise UsageError(f"{self.COUNT_OPTION} must be within 1..{SEED_BLOCK}, got {self.repetitions}")

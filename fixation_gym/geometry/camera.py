@@ -84,6 +84,11 @@ class Intrinsics:
         """The camera of undistorted pictures."""
         return replace(self, lens=None)
 
+    @property
+    def fovy(self) -> float:
+        """Vertical field of view, rad, of a pinhole with the principal point in the image centre."""
+        return 2.0 * math.atan(0.5 * self.height / self.fy)
+
     @cached_property
     def matrix(self) -> FloatArray:
         """Camera matrix K, shape (3, 3), px."""

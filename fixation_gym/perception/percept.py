@@ -17,9 +17,9 @@ class Percept:
     """All that perception says after one observation."""
 
     time: float
-    """Time of the observation, s; ``segmentation`` and ``fixation`` belong to it."""
+    """Time of the observation, s; ``fixation`` belongs to it."""
     segmentation: Segmentation
-    """Target in the current image."""
+    """Target in the newest image, which is of ``time`` unless it came late."""
     flow: Flow
     """Optic flow at the previous frame (``flow.time``)."""
     zfc: ZeroFlow

@@ -29,6 +29,7 @@ from fixation_gym.perception.flow.optic_flow import (
     plane_homography,
     prepare_grey,
 )
+from fixation_gym.perception.pairing import PoseHistory, at_the_picture, carried
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.rectification import Rectification, in_colour
 from fixation_gym.perception.scratch import Scratch
@@ -96,6 +97,7 @@ class Perception:
     def reset(self) -> None:
         """Forget everything seen."""
         self._detector.reset()
+        self._poses = PoseHistory()
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -105,6 +107,7 @@ class Perception:
         self._track: Track | None = None
         self._body = TargetBody()
         self._seen_time = -math.inf
+        self._late: Percept | None = None
 
     @property
     def flow_intrinsics(self) -> Intrinsics:
@@ -114,9 +117,23 @@ class Perception:
     def update(self, observation: Observation) -> Percept:
         """Take in one observation.
 
+        An image that came late, by its ``image_time``, goes with the pose of that time. One that was there before adds
+        nothing but how the camera moved since.
+
         Raises:
             ValueError: if the image has the wrong shape or the time does not increase.
         """
+        taken = observation.image_time
+        if taken is not None:
+            self._poses = self._poses.with_reading(observation)
+        if taken is None or taken == observation.time:
+            return self._look(observation)
+        if self._late is None or taken > self._late.time:
+            self._late = self._look(at_the_picture(observation, self._poses))
+        return carried(self._late, observation, self._poses)
+
+    def _look(self, observation: Observation) -> Percept:
+        """Take in an observation all of whose values are of one time."""
         if observation.rgb.ndim == 2:
             observation = replace(observation, rgb=in_colour(observation.rgb))
         self._check(observation)

@@ -25,6 +25,11 @@ def in_colour(image: ImageArray) -> ImageArray:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), np.uint8)
 
 
+def undistorted(image: ImageArray, camera: Intrinsics) -> ImageArray:
+    """A picture of a camera as its pinhole sees it; for many of them, keep a ``Rectification``."""
+    return image if camera.lens is None else Rectification(camera).image(image)
+
+
 class Rectification:
     """Undistorts what one camera sees, by maps that are computed once. Nothing of it changes after."""
 

@@ -2,7 +2,8 @@ import json
 
 import pytest
 
-from fixation_gym.envs.config import resolve_scenario, resolve_sensor_noise
+from fixation_gym.envs.config import resolve_scenario
+from fixation_gym.envs.sensor_noise import resolve_sensor_noise
 
 
 def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():

@@ -153,6 +153,7 @@ def test_bad_arguments_are_refused_before_anything_is_built(arguments, message):
 def test_nothing_private_reaches_the_observation(env):
     obs, _ = env.reset(seed=0)
     vectors = {"joint_pos", "joint_vel", "gripper_width", "camera_pose", "camera_twist", "time", "target_box"}
+    vectors |= {"image_time"}
     assert set(obs) == {"rgb", *vectors}
     assert env.observation_space.contains(obs)
 

@@ -98,7 +98,9 @@ def test_the_fast_view_shows_what_the_view_in_full_quality_shows(scenario):
     env = gym.make("FixationPick-v0", scenario=scenario, sensor_noise="ideal", image_size=(120, 160)).unwrapped
     for seed in (0, 1):
         env.reset(seed=seed)
-        fast, full = (env._image(view, env.sim.data.qpos).astype(np.float32) for view in ("observation", "wrist"))
+        views = (env._views.view(name, env.sim) for name in ("observation", "wrist"))
+        images = [view.render(env.sim.data.qpos, with_reflections=env.sim.has_mirror) for view in views]
+        fast, full = (image.astype(np.float32) for image in images)
         grey = full.mean(axis=-1)
         steep = np.hypot(cv2.Sobel(grey, -1, 1, 0), cv2.Sobel(grey, -1, 0, 1)) > 60
         flat = cv2.dilate(steep.astype(np.uint8), np.ones((3, 3))) == 0
@@ -134,7 +136,7 @@ def test_without_an_image_size_the_rest_of_the_observation_is_the_same():
         env.reset(seed=1)
     action = np.array([0.2, 0.1, 0.3, 0.0, 0.1, 0.0, -1.0], np.float32)
     blind, seeing = (env.step(action)[0] for env in envs)
-    assert set(seeing) - set(blind) == {"rgb", "target_box"}
+    assert set(seeing) - set(blind) == {"rgb", "target_box", "image_time"}
     assert blind in envs[0].observation_space
     for key, value in blind.items():
         np.testing.assert_array_equal(value, seeing[key], err_msg=key)

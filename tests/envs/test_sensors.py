@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fixation_gym.envs.config import SENSOR_NOISE
+from fixation_gym.envs.sensor_noise import SENSOR_NOISE
 from fixation_gym.envs.sensors import measure_image
 
 

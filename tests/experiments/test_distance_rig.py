@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fixation_gym.envs.config import SENSOR_NOISE
+from fixation_gym.envs.sensor_noise import SENSOR_NOISE
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, HOME, INTRINSICS, Condition
 from fixation_gym.geometry.rigid import inverse, look_at, transform
 from fixation_gym.perception.detection.colour import segment

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fixation_gym.envs.config import SENSOR_NOISE
+from fixation_gym.envs.sensor_noise import SENSOR_NOISE
 from fixation_gym.experiments.scenarios.scenes import SCENES
 
 pytestmark = pytest.mark.sim

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fixation_gym.envs.config import SensorNoise
+from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.experiments.distance.recording import Recording, calibrating
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, CYCLE_RATE, INTRINSICS
 from fixation_gym.geometry.rigid import transform

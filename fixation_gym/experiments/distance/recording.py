@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from fixation_gym.control.servo_laws import gaze_rotation
 from fixation_gym.envs import sensors
-from fixation_gym.envs.config import SensorNoise
+from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.experiments.distance.rig import PrintRig
 from fixation_gym.experiments.distance.sequence import (
     AFTER_JUMP_S,

@@ -102,7 +102,7 @@ class PrintRig:
     def step(self, twist: FloatArray, image_age: float) -> FloatArray:
         """Run one period with a camera twist, shape (6,); returns the configuration that the image shows."""
         substeps = self._sim.substeps - round(image_age / self._sim.model.opt.timestep)
-        return self._sim.step(twist, 0.0, substeps)[0]
+        return self._sim.step(twist, 0.0)[0][substeps - 1]
 
     def image(self, exposed: FloatArray | None = None) -> ImageArray:
         """Wrist image of a configuration from ``step``, or of now, without sensor noise, shape (480, 640, 3)."""

@@ -40,7 +40,7 @@ EXPERIMENT = Experiment(
 def run_cell(cell: Cell) -> dict[str, Any]:
     """Record the sequence of a cell and run every estimator on it; returns the cell with ``results`` and ``bounds``."""
     prepare_process()
-    from fixation_gym.envs.config import SENSOR_NOISE
+    from fixation_gym.envs.sensor_noise import SENSOR_NOISE
     from fixation_gym.experiments.distance.estimates import assess, bounds, methods, run
     from fixation_gym.experiments.distance.recording import record
     from fixation_gym.experiments.distance.rig import PrintRig

@@ -54,7 +54,7 @@ def play(world: World, policy: Policy) -> Outcome:
     collision = success = False
     while step < round(config.EPISODE_SECONDS / period) and not (collision or success):
         action = checked_action(policy.act({"time": np.array([step * period], np.float32)}), 7)
-        _, hit = sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]), sim.substeps)
+        _, hit = sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]))
         step += 1
         collision = hit or sim.obstacle_push() > config.COLLISION_PUSH
         lifted = lifted + 1 if sim.target_rise() >= config.LIFT_HEIGHT else 0

@@ -10,11 +10,12 @@ import numpy as np
 
 from fixation_gym.control.servo_laws import gaze_rotation, roll_rate
 from fixation_gym.envs import sensors
-from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE, SensorNoise
+from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE
 from fixation_gym.envs.pick_sim import PickSim
 from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import ObstacleSpec
 from fixation_gym.envs.scene_mjcf import CAMERA_NAME, HIDDEN_GROUP, obstacle_part_name
+from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.envs.truth_view import Truth, TruthView
 from fixation_gym.experiments.scenarios.scenes import Instance, sample_instance
 from fixation_gym.geometry.camera import Intrinsics
@@ -102,7 +103,7 @@ class ScenarioRig:
             body = model.body(self.sim.obstacles[instance.mover]).id
             model.geom_contype[model.geom_bodyid == body] = model.geom_conaffinity[model.geom_bodyid == body] = 0
             self.sim.data.xfrc_applied[body, :3] = -model.body_mass[body] * model.opt.gravity
-        self.sim.step(np.zeros(6), -1.0, self.sim.substeps)
+        self.sim.step(np.zeros(6), -1.0)
 
     def _image(self, qpos: FloatArray) -> ImageArray:
         return self._view.render(qpos, with_reflections=self._mirror)
@@ -124,7 +125,8 @@ class ScenarioRig:
             before = observation, exposed, depth
             self._drive(instance)
             twist = _command(instance, time, percept, observation)
-            exposed, _ = sim.step(twist, -1.0, sim.substeps - latency)
+            path, _ = sim.step(twist, -1.0)
+            exposed = path[sim.substeps - latency - 1]
 
     def truth(self, look: Look) -> Truth:
         """Truth of a look on the grid of the flow."""

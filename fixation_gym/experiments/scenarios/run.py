@@ -48,7 +48,7 @@ def instance_rng(cell: Cell) -> np.random.Generator:
 def rig_for(noise: str) -> ScenarioRig:
     """The rig of this process with some sensor noise."""
     prepare_process()
-    from fixation_gym.envs.config import SENSOR_NOISE
+    from fixation_gym.envs.sensor_noise import SENSOR_NOISE
     from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
     return kept(ScenarioRig, SENSOR_NOISE[noise], close=ScenarioRig.close)

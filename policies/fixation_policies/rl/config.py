@@ -45,7 +45,7 @@ class TrainConfig:
     workers: int = 4
     """Number of processes that step environments; more than cores is good, since grasps take long."""
     sensor_noise: str = "nominal"
-    """ideal, nominal or conservative."""
+    """ideal, nominal, conservative or realistic."""
     image_size: Fixed[tuple[int, int]] = (96, 128)
     """Height and width of the wrist image, px; the map's cells lie as those of 240x320."""
     eval_every: int = 2_000
@@ -77,7 +77,8 @@ class TrainConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
-        from fixation_gym.envs.config import SCENARIO_NAMES, SENSOR_NOISE
+        from fixation_gym.envs.config import SCENARIO_NAMES
+        from fixation_gym.envs.sensor_noise import SENSOR_NOISE
 
         check_names([self.config], CONFIGS, "configuration")
         check_names([self.algorithm], ALGORITHMS, "algorithm")

@@ -75,7 +75,7 @@ class ServoPolicy:
         self._memory = ObstacleMemory.empty()
         self._phase = Phase.SEARCH
         self._phase_start = 0.0
-        self._last_seen = -math.inf
+        self._last_seen = self._remembered_time = -math.inf
         self._stage: Stage | None = None
         self._grasps = 0
         self._search = WaySearch(self.gains)
@@ -118,7 +118,9 @@ class ServoPolicy:
         # While the gaze still swings to the target, small errors of the time stamps look like motion.
         centred = float(np.linalg.norm(percept.fixation.centroid)) < self.gains.grasp_centred
         looking = centred and self._stage is None and self._phase is not Phase.SEARCH
-        if looking and percept.flow.valid:
+        new = percept.flow.time > self._remembered_time  # an image that was there before tells nothing twice
+        if looking and percept.flow.valid and new:
+            self._remembered_time = percept.flow.time
             self._memory = remember(
                 self._memory,
                 percept.zfc,

@@ -1,0 +1,97 @@
+"""A picture that comes late goes with the pose of its time, and what it shows is carried to now."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pinhole_scene import Scene, fixating_pose, noise_texture, observe, upright
+
+from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import inverse, matrix_to_pose, transform
+from fixation_gym.geometry.twist import exp_twist
+from fixation_gym.perception.pairing import PoseHistory
+from fixation_gym.perception.pipeline import Perception
+
+CAMERA = Intrinsics.from_fovy(120, 160, 0.74)
+TARGET = np.array([0.6, 0.0, 0.2])
+SCENE = Scene(
+    [
+        upright([1.0, 0.0, 0.2], 1.0, 0.8, noise_texture(1)),
+        upright(TARGET, 0.05, 0.05, noise_texture(2, (1.0, 0.1, 0.1), 0.2)),
+        upright([0.35, 0.08, 0.2], 0.02, 0.05, noise_texture(3)),
+    ]
+)
+TWIST = np.array([0.1, 0.02, 0.0, 0.03, -0.1, 0.0])
+PERIOD, AGE, START = 0.04, 0.07, 1.0
+
+
+def pose_at(time):
+    """A camera of constant twist, at rest before ``START``."""
+    return fixating_pose([0.0, 0.03, 0.2], TARGET) @ exp_twist(TWIST, max(time - START, 0.0))
+
+
+def taken(time):
+    observation, _, _ = observe(SCENE, pose_at(time), round(time, 3), CAMERA)
+    return replace(observation, camera_twist=TWIST)
+
+
+def late(time, age=AGE):
+    """What the robot gets: pose and twist of now, the picture of ``age`` before."""
+    picture, now = taken(time - age), matrix_to_pose(pose_at(time))
+    return replace(picture, time=time, camera_pose=now, image_time=time - age)
+
+
+def test_late_pictures_give_the_map_and_the_place_that_pictures_in_time_give():
+    in_time, behind = Perception(CAMERA), Perception(CAMERA)
+    for step in range(24):
+        now = START + PERIOD * step
+        first, second = in_time.update(taken(now - AGE)), behind.update(late(now))
+    assert second.time == pytest.approx(now)
+    assert second.flow.time == pytest.approx(first.flow.time)
+    assert np.mean(first.zfc.cells != second.zfc.cells) < 0.01
+    np.testing.assert_allclose(second.fixation.point_base, first.fixation.point_base, atol=1e-3)
+    # The fixation is that of now, though nothing was seen since.
+    seen = transform(inverse(pose_at(now)), TARGET)
+    np.testing.assert_allclose(second.fixation.centroid, seen[:2] / seen[2], atol=3e-3)
+    believed = transform(inverse(pose_at(now)), second.fixation.point_base)
+    assert second.fixation.distance_m == pytest.approx(believed[2], rel=2e-3)
+    assert np.linalg.norm(second.fixation.centroid - first.fixation.centroid) > 3e-3
+
+
+def test_a_picture_that_was_there_before_tells_nothing_twice_and_gets_too_old():
+    perception = Perception(CAMERA)
+    for step in range(8):
+        newest = perception.update(late(START + PERIOD * step))
+    image_time = START + PERIOD * 7 - AGE
+    for step in range(8, 20):
+        now = START + PERIOD * step
+        again = replace(late(START + PERIOD * 7), time=now, camera_pose=matrix_to_pose(pose_at(now)))
+        percept = perception.update(again)
+        assert percept.flow is newest.flow
+        assert percept.fixation.visible == (now - image_time < 0.3)
+        seen = transform(inverse(pose_at(now)), percept.fixation.point_base)
+        assert percept.fixation.distance_m == pytest.approx(seen[2], rel=0.01)
+
+
+def test_poses_between_readings_follow_the_motion():
+    history = PoseHistory()
+    for time in (START, START + 0.04, START + 0.1):
+        observation = replace(taken(0.0), time=time, camera_pose=matrix_to_pose(pose_at(time)))
+        history = history.with_reading(observation)
+    for time in (START + 0.01, START + 0.04, START + 0.075):
+        np.testing.assert_allclose(history.at(time)[0], pose_at(time), atol=1e-9)
+    np.testing.assert_allclose(history.at(0.0)[0], pose_at(START), atol=1e-9)
+    np.testing.assert_allclose(history.at(9.0)[0], pose_at(START + 0.1), atol=1e-9)
+    with pytest.raises(ValueError, match="time must increase"):
+        history.with_reading(observation)
+    assert len(history.with_reading(replace(observation, time=5.0)).times) == 1
+
+
+def test_a_picture_of_now_is_taken_as_without_a_stamp():
+    plain, stamped = Perception(CAMERA), Perception(CAMERA)
+    for step in range(6):
+        observation = taken(PERIOD * step)
+        first = plain.update(observation)
+        second = stamped.update(replace(observation, image_time=observation.time))
+    np.testing.assert_array_equal(first.zfc.cells, second.zfc.cells)
+    np.testing.assert_array_equal(first.fixation.point_base, second.fixation.point_base)
