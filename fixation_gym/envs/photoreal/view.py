@@ -1,0 +1,120 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's functions have no type stubs.)
+"""The wrist camera's picture by Mitsuba, of the same model state as ``rendering.View``."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fixation_gym.envs import scene_mjcf
+from fixation_gym.envs.photoreal import build, engine
+from fixation_gym.envs.photoreal.materials import Material, srgb
+from fixation_gym.envs.photoreal.solids import Solid, solids_of, texture_image
+from fixation_gym.types import FloatArray, ImageArray
+
+SAMPLES = 16
+"""Rays per pixel."""
+_MITSUBA_AXES = np.diag([-1.0, 1.0, -1.0])
+"""Mitsuba's camera axes (x left, y up, z forward) in MuJoCo's (x right, y up, z backward)."""
+
+
+class PhotorealView:
+    """Renders the wrist camera of a model at a fixed size. A scene is built once, then its things are moved."""
+
+    def __init__(self, model: Any, height: int, width: int, samples: int = SAMPLES) -> None:
+        """Load Mitsuba.
+
+        Args:
+            model: compiled ``mjModel``.
+            height: image rows, px.
+            width: image columns, px.
+            samples: rays per pixel.
+
+        Raises:
+            MissingMitsubaError: if it is not installed.
+        """
+        self._mitsuba = engine.load()
+        self._model, self._data = model, mujoco.MjData(model)
+        self._size, self._samples = (height, width), samples
+        self._camera = model.camera(scene_mjcf.CAMERA_NAME).id
+        self._materials: dict[Material, Any] = {}
+        self._solids: list[Solid] = []
+        self._poses: list[tuple[FloatArray, FloatArray]] = []
+        self._scene: Any = None
+        self._parameters: Any = None
+
+    @property
+    def scene(self) -> Any:
+        """Mitsuba's scene as it was last rendered, for experiments that follow rays of their own."""
+        return self._scene
+
+    @property
+    def bodies(self) -> list[int]:
+        """Index in the model of the body that each shape "solid<i>" of the scene belongs to."""
+        return [solid.body for solid in self._solids]
+
+    def load(self) -> None:
+        """Take over what the model shows. Call it after a scene has been loaded into the model."""
+        self._scene = None
+
+    def render(self, qpos: FloatArray, seed: int) -> ImageArray:
+        """Image of the configuration, shape (H, W, 3), top-left origin.
+
+        Args:
+            qpos: of the model.
+            seed: of the random paths of light, within 0..2^32-1; equal seeds give equal images.
+        """
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        if self._scene is None:
+            self._build()
+        else:
+            self._move()
+        intensities = np.array(self._mitsuba.render(self._scene, seed=seed, spp=self._samples))
+        return np.rint(255.0 * srgb(intensities)).astype(np.uint8)
+
+    def _build(self) -> None:
+        model, mitsuba = self._model, self._mitsuba
+        self._solids = solids_of(model)
+        self._poses = [self._pose(solid) for solid in self._solids]
+        # Textures are large: those of the last scene are kept as far as this one shows them.
+        used = {solid.material for solid in self._solids}
+        self._materials = {kind: self._materials.get(kind) or self._material(kind) for kind in used}
+        shapes = {
+            f"solid{i}": build.shape(mitsuba, solid.mesh.placed(*pose), self._materials[solid.material])
+            for i, (solid, pose) in enumerate(zip(self._solids, self._poses, strict=True))
+        }
+        fovy = math.radians(model.cam_fovy[self._camera])
+        sensor = build.camera(mitsuba, self._camera_pose(), fovy, self._size, self._samples)
+        table = self._data.geom_xpos[model.geom("table_visual").id]
+        self._scene = build.scene(mitsuba, sensor, shapes, model.light_dir[0], table)
+        self._parameters = mitsuba.traverse(self._scene)
+
+    def _move(self) -> None:
+        for index, solid in enumerate(self._solids):
+            pose, before = self._pose(solid), self._poses[index]
+            # Exactly: a picture must not depend on those before it. What rests sleeps, and does not change at all.
+            if not all(np.array_equal(now, then) for now, then in zip(pose, before, strict=True)):
+                self._poses[index] = pose
+                build.write_mesh(self._parameters, f"solid{index}.", solid.mesh.placed(*pose))
+        pose = self._parameters["sensor.to_world"]
+        self._parameters["sensor.to_world"] = type(pose)(self._camera_pose())
+        self._parameters.update()
+
+    def _pose(self, solid: Solid) -> tuple[FloatArray, FloatArray]:
+        return self._data.xmat[solid.body].reshape(3, 3).copy(), self._data.xpos[solid.body].copy()
+
+    def _camera_pose(self) -> FloatArray:
+        pose = np.eye(4)
+        pose[:3, :3] = self._data.cam_xmat[self._camera].reshape(3, 3) @ _MITSUBA_AXES
+        pose[:3, 3] = self._data.cam_xpos[self._camera]
+        return pose
+
+    def _material(self, kind: Material) -> Any:
+        image = texture_image(self._model, kind) if kind.texture >= 0 else None
+        return build.material(self._mitsuba, kind, image)

@@ -1,0 +1,45 @@
+"""Which variant of Mitsuba is chosen, and what is said where there is none."""
+
+import importlib.util
+
+import pytest
+
+from fixation_gym.envs.photoreal import engine
+from fixation_gym.errors import UsageError
+
+
+@pytest.fixture(autouse=True)
+def nothing_chosen(monkeypatch):
+    monkeypatch.delenv(engine.VARIANT, raising=False)
+    monkeypatch.delenv("FIXATION_GYM_MITSUBA_CHECKED", raising=False)
+
+
+def test_missing_mitsuba_names_the_extra(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(UsageError, match=r"not installed; pip install 'fixation-gym\[photoreal\]'$"):
+        engine.load()
+
+
+def test_unknown_variant_says_what_is_allowed(monkeypatch):
+    monkeypatch.setattr(engine, "is_installed", lambda: True)
+    monkeypatch.setenv(engine.VARIANT, "cuda_ad_rgb")
+    with pytest.raises(UsageError, match="must be llvm_ad_rgb or scalar_rgb, got 'cuda_ad_rgb'"):
+        engine.choose_variant()
+
+
+def test_llvm_is_chosen_where_it_works_and_asked_once(monkeypatch):
+    asked = []
+    monkeypatch.setattr(engine, "is_installed", lambda: True)
+    monkeypatch.setattr(engine, "why_no_llvm", lambda: asked.append(1) or "")
+    assert [engine.choose_variant(), engine.choose_variant()] == [engine.LLVM, engine.LLVM]
+    assert len(asked) == 1
+
+
+def test_scalar_variant_is_taken_without_an_llvm_library(monkeypatch, tmp_path):
+    pytest.importorskip("mitsuba")
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM.so"))
+    assert "libllvm19" in engine.why_no_llvm()
+    assert engine.choose_variant() == engine.SCALAR
+    monkeypatch.setenv(engine.VARIANT, engine.LLVM)
+    with pytest.raises(UsageError, match="FIXATION_GYM_MITSUBA=llvm_ad_rgb does not work here"):
+        engine.choose_variant()
