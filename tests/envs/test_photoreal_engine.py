@@ -10,8 +10,9 @@ from fixation_gym.errors import UsageError
 
 @pytest.fixture(autouse=True)
 def nothing_chosen(monkeypatch):
-    monkeypatch.delenv(engine.VARIANT, raising=False)
-    monkeypatch.delenv("FIXATION_GYM_MITSUBA_CHECKED", raising=False)
+    for name in (engine.VARIANT, "FIXATION_GYM_MITSUBA_CHECKED"):
+        monkeypatch.setenv(name, "")  # so that what the test leaves there goes when it ends
+        monkeypatch.delenv(name)
 
 
 def test_missing_mitsuba_names_the_extra(monkeypatch):
