@@ -47,6 +47,10 @@ class Scenario:
     """Smallest and largest number of obstacles that stand still, inclusive."""
     free_elevation_deg: tuple[float, float] = ROBOT.arm.reach.elevations_deg
     """Range of the elevation of the way that is left free, deg."""
+    free_azimuth_shape: tuple[float, float] = (0.75, 0.6)
+    """Both exponents of the beta distribution from which its azimuth is drawn over the reach; (1, 1) is even. Fewer
+    scenes are found for a way in the middle, which has ways on all sides that it takes along, than for one at an end:
+    the shape is to make up for that, so that all ways are free about equally often."""
     moving_count: tuple[int, int] = (0, 0)
     """Smallest and largest number of obstacles that move, inclusive."""
     alpha: tuple[float, float] = (0.3, 0.7)
@@ -93,6 +97,7 @@ class Scenario:
         _require_range("grasp_width", self.grasp_width, *ROBOT.hand.grasp_widths)
         _require_range("alpha", self.alpha, 0.0, 1.0)
         _require_range("free_elevation_deg", self.free_elevation_deg, *ROBOT.arm.reach.elevations_deg)
+        _require_shape("free_azimuth_shape", self.free_azimuth_shape)
         _require_range("view_elevation_deg", self.view_elevation_deg, 30.0, 60.0)
         _require_names("obstacle_motions", self.obstacle_motions, OBSTACLE_MOTIONS)
         _require_range("drive_speed", self.drive_speed, 0.01, 0.10)
@@ -140,6 +145,13 @@ def _require_range(field: str, values: tuple[float, float], lowest: float, highe
         raise ValueError(f"{field} must be two numbers (low, high), got {values!r}")
     if not lowest <= values[0] <= values[1] <= highest:
         raise ValueError(f"{field} must be (low, high) within {lowest}..{highest}, got {values}")
+
+
+def _require_shape(field: str, values: tuple[float, float]) -> None:
+    """Check the exponents of a beta distribution; beyond these bounds it would be nearly one value."""
+    pair = isinstance(values, (tuple, list)) and len(values) == 2
+    if not pair or not all(isinstance(value, (int, float)) and 0.2 <= value <= 5.0 for value in values):
+        raise ValueError(f"{field} must be two numbers within 0.2..5, got {values!r}")
 
 
 def _require_probability(field: str, value: float) -> None:
@@ -200,6 +212,7 @@ SCENARIOS: dict[str, Scenario] = {
             first_kinds=("bin",),
             obstacle_count=(2, 6),
             free_elevation_deg=_reached(46.0, 82.0),
+            free_azimuth_shape=(1.3, 1.1),
         ),
         Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
         Scenario(

@@ -35,9 +35,9 @@ _TARGET_TEXTURES = ("bricks", "wood_light", "metal")
 """Textures of targets of any colour."""
 _FRAME_HUES = (1.0 / 8.0, 7.0 / 8.0)
 """Range of the hue of coloured frames, 0..1: anything but the target's red."""
-_ELEVATION_SHAPE, _AZIMUTH_SHAPE = (0.5, 0.65), (0.75, 0.6)
-"""Beta distributions of the free way's elevation and azimuth over the reach. Evenly drawn, ways in the middle would be
-free most often, for there are ways on all sides of them that take them along; so the ends come up more."""
+_ELEVATION_SHAPE = (0.5, 0.65)
+"""Beta distribution of the free way's elevation. Evenly drawn, ways in the middle would be free most often, for there
+are ways on all sides of them that take them along; so the ends come up more."""
 _ELEVATIONS, _AZIMUTHS, _TARGETS = 6, 8, 40
 """Elevations of the free way, azimuths for each and targets for each of those that are tried."""
 _VIEWS, _VIEW_DRAWS = 4, 24
@@ -70,7 +70,7 @@ def _free_ways(scenario: Scenario, rng: np.random.Generator) -> Iterator[tuple[f
     for _ in range(_ELEVATIONS):
         elevation = low + (high - low) * float(rng.beta(*_ELEVATION_SHAPE))
         for _ in range(_AZIMUTHS):
-            free = sample_direction(rng, elevation, _AZIMUTH_SHAPE)
+            free = sample_direction(rng, elevation, scenario.free_azimuth_shape)
             for _ in range(_TARGETS):
                 yield free
 
