@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fixation_gym import gl
+from fixation_gym.envs.photoreal import engine
 from fixation_gym.gl import PROBE_MODEL, MissingGLError, select_backend
 
 REQUIRED = (
@@ -26,7 +27,7 @@ REQUIRED = (
     "tyro",
     "matplotlib",
 )
-OPTIONAL = ("torch", "stable-baselines3", "tensorboard", "ray")
+OPTIONAL = ("torch", "stable-baselines3", "tensorboard", "ray", "mitsuba")
 HEADLESS_CV2 = "opencv-python-headless"
 OTHER_CV2 = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
 """Distributions that write the same folder ``cv2``; with two of them, neither is whole."""
@@ -108,7 +109,8 @@ def diagnose() -> dict[str, Any]:
     Returns:
         ``ok``; ``problems``, each with what to do; ``notes`` on what works, but is not as tested; ``versions``; ``gl``,
         the backend or None; ``gl_renderer``, its name of itself; ``workers``, which processes can render;
-        ``frame_brightness``, the mean of a rendered test frame (0..255) or None.
+        ``frame_brightness``, the mean of a rendered test frame (0..255) or None; ``mitsuba``, which of its variants
+        the photoreal renderer takes, and why, or None if it is not installed.
     """
     versions = installed_versions()
     problems = package_problems(versions)
@@ -132,6 +134,7 @@ def diagnose() -> dict[str, Any]:
         "gl_renderer": gl.renderer_name() or None,
         "workers": None if brightness is None else _FORK if gl.renders_after_fork() else _SPAWN,
         "frame_brightness": brightness,
+        "mitsuba": engine.explain_choice() if engine.is_installed() else None,
     }
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from fixation_gym.envs import arguments, config, rewards, sensors, wrist_camera
+from fixation_gym.envs.photoreal.engine import check_renderer
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.sensor_noise import SensorNoise, resolve_sensor_noise
@@ -87,6 +88,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         render_view: str = "front",
         reward: str = "dense",
         reward_weights: rewards.RewardWeights | Mapping[str, float] | None = None,
+        renderer: str = "mujoco",
     ) -> None:
         """Check the arguments; the simulation itself is built at the first reset.
 
@@ -101,10 +103,12 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             reward: "dense" or "sparse".
             reward_weights: of the dense reward: ``rewards.RewardWeights``, or a mapping with some of them; None for the
                 defaults.
+            renderer: of ``rgb``: "mujoco", or "mitsuba" with real glass and mirrors (extra ``photoreal``; slow).
 
         Raises:
             ValueError: for a value that is not allowed; the message says what is.
         """
+        check_renderer(renderer)
         self.scenario = config.resolve_scenario(scenario)
         self.noise = resolve_sensor_noise(sensor_noise)
         self._image_size = arguments.checked_image_size(image_size)
@@ -119,6 +123,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             "sensor_noise": sensor_noise if isinstance(sensor_noise, str) else self.noise,
             "control_frequency": control_frequency,
             "reward": reward,
+            "renderer": renderer,
             "reward_weights": rewards.resolve_weights(reward_weights or {}) if reward == "dense" else None,
         }
         self.metadata = self.metadata | {"render_fps": control_frequency}
@@ -131,7 +136,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self._limits = arguments.limits(self.observation_space)
         self._running = False
         self._sim: PickSim | None = None
-        self._views = Views(self.intrinsics)
+        self._views = Views(self.intrinsics, renderer)
         self.percept: Percept | None = None
         """What whoever acts perceived in the last observation, if it says so: drawn into the overlay."""
         self.scene: SceneSpec | None = None
@@ -199,8 +204,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             self._views.show(self.sim)
             return None
         shows_overlay = self.render_view == "overlay"
-        view = self._views.view("front" if shows_overlay else self.render_view, self.sim)
-        shown = view.render(self.sim.data.qpos, with_reflections=self.sim.has_mirror)
+        shown = self._views.image("front" if shows_overlay else self.render_view, self.sim, self.sim.data.qpos)
         return overlay(undistorted(self._last_rgb, self.intrinsics), self.percept, shown) if shows_overlay else shown
 
     def close(self) -> None:
@@ -264,7 +268,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         observation: dict[str, Any] = {}
         if self._image_size is not None:
             if self.camera_on and self._camera.fresh:
-                light, exposure = partial(self._views.light, self.sim), self._errors.exposure
+                light, exposure = partial(self._views.light, self.sim, self._noise_rng), self._errors.exposure
                 self._last_rgb = wrist_camera.picture(self._camera, self.noise, exposure, light, self._noise_rng)
                 self._image_time = self._camera.stamp_s
             observation["rgb"] = self._last_rgb.copy()

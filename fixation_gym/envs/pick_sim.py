@@ -104,6 +104,7 @@ class PickSim:
         self._loader = SceneLoader(model)
         self._display: tuple[Any, SceneLoader] | None = None
         self._joint_command = np.zeros(_JOINTS)
+        self.scene: SceneSpec | None = None
         self.obstacles: tuple[str, ...] = ()
         self._movers: tuple[Mover, ...] = ()
 
@@ -134,7 +135,7 @@ class PickSim:
         """
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
-        self._scene = scene
+        self.scene = scene
         placed = self._loader.load(scene)
         if self._display is not None:
             self._display[1].load(scene)
@@ -222,10 +223,11 @@ class PickSim:
 
     def get_state(self) -> SimState:
         """What its future depends on; call it after a reset."""
+        assert self.scene is not None, "there was a reset"
         arrays = {name: getattr(self.data, name).copy() for name in self._arrays}
         numbers = {name: getattr(self.data, name) for name in _NUMBERS}
         movers = tuple(mover.state for mover in self._movers)
-        return SimState(self._scene, arrays, numbers, self._joint_command.copy(), movers)
+        return SimState(self.scene, arrays, numbers, self._joint_command.copy(), movers)
 
     def set_state(self, state: SimState) -> None:
         """Go on from there, bit by bit as the simulation that it was taken from."""
@@ -244,13 +246,14 @@ class PickSim:
         if self._display is None:
             model = compile_model(self._extend, looks=True).model
             self._display = model, SceneLoader(model)
-            self._display[1].load(self._scene)
+            if self.scene is not None:
+                self._display[1].load(self.scene)
         return self._display[0]
 
     @property
     def has_mirror(self) -> bool:
         """Whether pictures show reflections."""
-        return any(obstacle.kind == "mirror" for obstacle in self._scene.obstacles)
+        return self.scene is not None and any(obstacle.kind == "mirror" for obstacle in self.scene.obstacles)
 
     # -- truth ---------------------------------------------------------------------------------------------------
 

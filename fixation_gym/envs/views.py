@@ -13,8 +13,10 @@ from fixation_gym.perception.percept import Percept
 from fixation_gym.types import FloatArray, ImageArray
 
 if TYPE_CHECKING:
+    from fixation_gym.envs.photoreal.view import PhotorealView
     from fixation_gym.envs.pick_sim import PickSim
     from fixation_gym.envs.rendering import View, Window
+    from fixation_gym.envs.scene import SceneSpec
 
 _FRONT_SIZE = (360, 480)
 
@@ -22,12 +24,15 @@ _FRONT_SIZE = (360, 480)
 class Views:
     """Views "observation", "wide", "wrist" and "front" and a window on a simulation, each opened at first use.
 
-    "wide" is what the wrist camera's lens sees, which may be more than its pinhole.
+    "wide" is what the wrist camera's lens sees, which may be more than its pinhole. All are MuJoCo's; only what is
+    observed may be another renderer's.
     """
 
-    def __init__(self, camera: Intrinsics) -> None:
-        """Note the wrist camera; opens nothing."""
-        self._camera = camera
+    def __init__(self, camera: Intrinsics, renderer: str = "mujoco") -> None:
+        """Note the wrist camera and who makes what it sees; opens nothing."""
+        self._camera, self._renderer = camera, renderer
+        self._photoreal: PhotorealView | None = None
+        self._shown: SceneSpec | None = None
         self._views: dict[str, View] = {}
         self._window: Window | None = None
 
@@ -45,11 +50,32 @@ class Views:
             self._views[name] = View(model, camera, *size, full_quality=for_people, fovy=fovy)
         return self._views[name]
 
-    def light(self, sim: PickSim, qpos: FloatArray) -> ImageArray:
-        """What the wrist camera would see of a configuration at rest, through its lens, shape (H, W, 3)."""
-        if self._camera.lens is None:
-            return self.view("observation", sim).render(qpos, with_reflections=sim.has_mirror)
-        return through_lens(self.view("wide", sim).render(qpos, with_reflections=sim.has_mirror), self._camera)
+    def image(self, name: str, sim: PickSim, qpos: FloatArray) -> ImageArray:
+        """What one of the views shows of a configuration."""
+        return self.view(name, sim).render(qpos, with_reflections=sim.has_mirror)
+
+    def light(self, sim: PickSim, rng: np.random.Generator, qpos: FloatArray) -> ImageArray:
+        """What the wrist camera would see of a configuration at rest, through its lens, shape (H, W, 3).
+
+        Rays that are followed at random get a seed from ``rng``.
+        """
+        if self._renderer == "mitsuba":
+            seen = self._traced(sim).render(qpos, seed=int(rng.integers(2**32)))
+        else:
+            seen = self.image("observation" if self._camera.lens is None else "wide", sim, qpos)
+        return seen if self._camera.lens is None else through_lens(seen, self._camera)
+
+    def _traced(self, sim: PickSim) -> PhotorealView:
+        """Mitsuba's view of the present scene."""
+        if self._photoreal is None:
+            from fixation_gym.envs.photoreal.view import PhotorealView
+
+            pinhole = self._camera if self._camera.lens is None else wide_pinhole(self._camera)
+            self._photoreal = PhotorealView(sim.model, pinhole)
+        if self._shown is not sim.scene:
+            self._photoreal.load()
+            self._shown = sim.scene
+        return self._photoreal
 
     def show(self, sim: PickSim) -> None:
         """Show the current state in the window."""
@@ -63,7 +89,7 @@ class Views:
         """Free GL contexts and the window; may be called twice. They are opened again at the next use."""
         for view in self._views.values():
             view.close()
-        self._views = {}
+        self._views, self._photoreal = {}, None
         if self._window is not None:
             self._window.close()
             self._window = None

@@ -88,6 +88,7 @@ class FixationPickZFC(FixationPickEnv):
         render_view: str = "front",
         reward: str = "dense",
         reward_weights: RewardWeights | Mapping[str, float] | None = None,
+        renderer: str = "mujoco",
     ) -> None:
         """Check the arguments; the simulation itself is built at the first reset.
 
@@ -101,6 +102,7 @@ class FixationPickZFC(FixationPickEnv):
             render_view: of "rgb_array".
             reward: "dense" or "sparse".
             reward_weights: of the dense reward.
+            renderer: "mujoco" or "mitsuba"; perception sees its picture.
 
         Raises:
             ValueError: for a value that is not allowed; the message says what is.
@@ -117,6 +119,7 @@ class FixationPickZFC(FixationPickEnv):
             render_view,
             reward,
             reward_weights,
+            renderer,
         )
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = zfc_observation_space(observation, (self.intrinsics.height, self.intrinsics.width))

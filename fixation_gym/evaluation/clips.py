@@ -118,6 +118,7 @@ def _cell(evaluation: Evaluation, result: EpisodeResult) -> workers.Cell:
         "sensor_noise": run["sensor_noise"],
         "image_size": run["image_size"],
         "detector": run.get("detector"),
+        "renderer": run.get("renderer", "mujoco"),
         "decisions": moments(result, evaluation.trace(result)),
     }
 

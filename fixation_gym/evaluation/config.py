@@ -44,6 +44,8 @@ class EvaluationConfig:
     """ideal, nominal, conservative or realistic."""
     image_size: tuple[int, int] | None = None
     """Height and width of the wrist image, px; 240 320 by default, for an agent those of its training."""
+    renderer: str = "mujoco"
+    """Who makes the wrist image: mujoco, or mitsuba with real glass and mirrors (extra photoreal; slow)."""
     workers: int = 1
     """Number of processes."""
     backend: str = "loky"
@@ -55,6 +57,7 @@ class EvaluationConfig:
         Raises:
             UsageError: naming the first bad value and what is allowed.
         """
+        from fixation_gym.envs.photoreal.engine import check_renderer
         from fixation_gym.envs.sensor_noise import SENSOR_NOISE
         from fixation_gym.evaluation.workers import check_backend
         from fixation_policies.catalogue import check_detector, check_policy
@@ -62,6 +65,7 @@ class EvaluationConfig:
         check_policy(self.policy)
         check_detector(self.detector, self.policy)
         check_names([self.sensor_noise], SENSOR_NOISE, "sensor noise")
+        check_renderer(self.renderer)
         check_scenarios(self.scenarios)
         if not 1 <= self.episodes <= SEED_BLOCK:
             raise UsageError(f"--episodes must be within 1..{SEED_BLOCK}, got {self.episodes}")
@@ -91,10 +95,19 @@ class EvaluationConfig:
             "image_size": list(surroundings.image_size),
             "env_id": surroundings.env_id,
             **({} if self.detector is None else {"detector": self.detector}),
+            **self._renderer_description(),
             **source_hashes(self.policy, self.detector),
             "gl": os.environ.get("MUJOCO_GL"),
             "versions": installed_versions(),
         }
+
+    def _renderer_description(self) -> dict[str, str]:
+        """The renderer, if it is not MuJoCo's. Variants of Mitsuba differ in the noise of their pictures."""
+        if self.renderer == "mujoco":
+            return {}
+        from fixation_gym.envs.photoreal.engine import choose_variant
+
+        return {"renderer": self.renderer, "variant": choose_variant()}
 
     def episode_keys(self) -> list[EpisodeKey]:
         """(scenario, seed) of every episode, in order."""
@@ -112,6 +125,7 @@ class EvaluationConfig:
             "seed": seed,
             "sensor_noise": self.sensor_noise,
             "image_size": list(surroundings.image_size),
+            "renderer": self.renderer,
         }
 
 

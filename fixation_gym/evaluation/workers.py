@@ -22,7 +22,7 @@ _WATCH_S = 0.5
 """How often a worker looks whether the process that started it is there, s."""
 
 Cell = dict[str, Any]
-"""One episode to run: env_id, scenario, policy, detector, seed, sensor_noise, image_size. JSON-able and picklable."""
+"""One episode to run: env_id, scenario, policy, detector, seed, sensor_noise, image_size, renderer; JSON-able."""
 
 Thing = TypeVar("Thing")
 _kept: dict[tuple[Any, ...], tuple[Any, Callable[[Any], object]]] = {}  # at most one: environments and rigs are large
@@ -84,6 +84,7 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
         image_size=tuple(cell["image_size"]),
         render_mode=render_mode,
         render_view=render_view,
+        renderer=cell["renderer"],
         **surroundings(cell["policy"]).arguments,
     )
 

@@ -26,6 +26,7 @@ def evaluate_command(evaluation: Evaluation) -> str:
         "--seed": run["seed"],
         "--sensor-noise": run["sensor_noise"],
         "--image-size": f"{height} {width}",
+        **({"--renderer": run["renderer"]} if "renderer" in run else {}),
     }
     words = [word for option, value in options.items() for word in (option, *str(value).split())]
     return f"fixation-gym evaluate {shlex.join(words)} --out DIR"
@@ -50,6 +51,7 @@ def differences(records: Sequence[PolicyRecord]) -> list[str]:
     values = {
         "sensor noise": [record.evaluation.run["sensor_noise"] for record in records],
         "image size": [record.evaluation.run["image_size"] for record in records],
+        "renderer": [record.evaluation.run.get("renderer") for record in records],
         "versions of packages": [record.evaluation.run.get("versions") for record in records],
         "commit": [record.evaluation.summary.get("commit") for record in records],
     }

@@ -4,7 +4,10 @@ import importlib.util
 
 import pytest
 
+from fixation_gym.cli import main
 from fixation_gym.envs.photoreal import engine
+from fixation_gym.envs.pick_env import FixationPickEnv
+from fixation_gym.envs.zfc_env import FixationPickZFC
 from fixation_gym.errors import UsageError
 
 
@@ -44,3 +47,30 @@ def test_scalar_variant_is_taken_without_an_llvm_library(monkeypatch, tmp_path):
     monkeypatch.setenv(engine.VARIANT, engine.LLVM)
     with pytest.raises(UsageError, match="FIXATION_GYM_MITSUBA=llvm_ad_rgb does not work here"):
         engine.choose_variant()
+
+
+def test_reasons_are_told_with_the_choice(monkeypatch):
+    monkeypatch.setattr(engine, "is_installed", lambda: True)
+    monkeypatch.setattr(engine, "why_no_llvm", lambda: "it is too old")
+    assert engine.explain_choice() == "scalar_rgb, for llvm_ad_rgb does not work: it is too old"
+    monkeypatch.setenv(engine.VARIANT, engine.SCALAR)
+    assert engine.explain_choice() == "scalar_rgb, as FIXATION_GYM_MITSUBA says"
+    monkeypatch.setenv(engine.VARIANT, engine.LLVM)
+    assert engine.explain_choice() == "FIXATION_GYM_MITSUBA=llvm_ad_rgb does not work here: it is too old"
+
+
+@pytest.mark.parametrize("make", [FixationPickEnv, FixationPickZFC])
+def test_environments_say_which_renderers_there_are_and_what_is_missing(make, monkeypatch):
+    with pytest.raises(ValueError, match="unknown renderer 'blender'; choose one of mujoco, mitsuba"):
+        make(renderer="blender")
+    monkeypatch.setattr(engine, "is_installed", lambda: False)
+    with pytest.raises(ValueError, match=r"not installed; pip install 'fixation-gym\[photoreal\]'"):
+        make(renderer="mitsuba")
+
+
+def test_command_line_says_so_too(monkeypatch, capsys):
+    assert main(["evaluate", "--renderer", "blender"]) == 2
+    assert "unknown renderer 'blender'; choose one of mujoco, mitsuba" in capsys.readouterr().err
+    monkeypatch.setattr(engine, "is_installed", lambda: False)
+    assert main(["evaluate", "--renderer", "mitsuba"]) == 2
+    assert "pip install 'fixation-gym[photoreal]'" in capsys.readouterr().err

@@ -31,7 +31,7 @@ def env():
 def photoreal_view(env, size, samples=1):
     from fixation_gym.envs.photoreal.view import PhotorealView
 
-    return PhotorealView(env.unwrapped.model, *size, samples)
+    return PhotorealView(env.unwrapped.model, Intrinsics.from_fovy(*size, ROBOT.camera.fovy), samples)
 
 
 def bodies_seen(view, qpos):

@@ -13,8 +13,10 @@ import subprocess
 import sys
 from typing import Any
 
-from fixation_gym.errors import UsageError
+from fixation_gym.errors import UsageError, check_names
 
+RENDERERS = ("mujoco", "mitsuba")
+"""What can make the wrist camera's pictures."""
 LLVM, SCALAR = "llvm_ad_rgb", "scalar_rgb"
 """Variants of Mitsuba that are used, the faster one first."""
 VARIANT = "FIXATION_GYM_MITSUBA"
@@ -42,6 +44,17 @@ class MissingMitsubaError(UsageError):
 def is_installed() -> bool:
     """Whether Mitsuba can be imported."""
     return importlib.util.find_spec("mitsuba") is not None
+
+
+def check_renderer(name: str) -> None:
+    """Check that there is a renderer of that name here.
+
+    Raises:
+        UsageError: if there is none of that name, or it needs what is not installed.
+    """
+    check_names([name], RENDERERS, "renderer")
+    if name == "mitsuba":
+        require()
 
 
 def require() -> None:
@@ -77,6 +90,17 @@ def choose_variant() -> str:
     if checked is None:
         checked = os.environ[_CHECKED] = SCALAR if why_no_llvm() else LLVM
     return checked
+
+
+def explain_choice() -> str:
+    """Which variant is taken, and why, as one line. Call it where Mitsuba is installed."""
+    try:
+        variant = choose_variant()
+    except MissingMitsubaError as error:
+        return str(error)
+    if os.environ.get(VARIANT, "").strip():
+        return f"{variant}, as {VARIANT} says"
+    return f"{LLVM}, which works here" if variant == LLVM else f"{SCALAR}, for {LLVM} does not work: {why_no_llvm()}"
 
 
 def why_no_llvm() -> str:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import mujoco
@@ -14,6 +13,7 @@ from fixation_gym.envs import scene_mjcf
 from fixation_gym.envs.photoreal import build, engine
 from fixation_gym.envs.photoreal.materials import Material, srgb
 from fixation_gym.envs.photoreal.solids import Solid, solids_of, texture_image
+from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.types import FloatArray, ImageArray
 
 SAMPLES = 16
@@ -25,13 +25,12 @@ _MITSUBA_AXES = np.diag([-1.0, 1.0, -1.0])
 class PhotorealView:
     """Renders the wrist camera of a model at a fixed size. A scene is built once, then its things are moved."""
 
-    def __init__(self, model: Any, height: int, width: int, samples: int = SAMPLES) -> None:
+    def __init__(self, model: Any, pinhole: Intrinsics, samples: int = SAMPLES) -> None:
         """Load Mitsuba.
 
         Args:
             model: compiled ``mjModel``.
-            height: image rows, px.
-            width: image columns, px.
+            pinhole: of the pictures.
             samples: rays per pixel.
 
         Raises:
@@ -39,7 +38,7 @@ class PhotorealView:
         """
         self._mitsuba = engine.load()
         self._model, self._data = model, mujoco.MjData(model)
-        self._size, self._samples = (height, width), samples
+        self._pinhole, self._samples = pinhole, samples
         self._camera = model.camera(scene_mjcf.CAMERA_NAME).id
         self._materials: dict[Material, Any] = {}
         self._solids: list[Solid] = []
@@ -89,8 +88,8 @@ class PhotorealView:
             f"solid{i}": build.shape(mitsuba, solid.mesh.placed(*pose), self._materials[solid.material])
             for i, (solid, pose) in enumerate(zip(self._solids, self._poses, strict=True))
         }
-        fovy = math.radians(model.cam_fovy[self._camera])
-        sensor = build.camera(mitsuba, self._camera_pose(), fovy, self._size, self._samples)
+        size = (self._pinhole.height, self._pinhole.width)
+        sensor = build.camera(mitsuba, self._camera_pose(), self._pinhole.fovy, size, self._samples)
         table = self._data.geom_xpos[model.geom("table_visual").id]
         self._scene = build.scene(mitsuba, sensor, shapes, model.light_dir[0], table)
         self._parameters = mitsuba.traverse(self._scene)
