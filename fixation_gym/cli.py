@@ -27,7 +27,7 @@ from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train
 from fixation_gym.names import Names
 from fixation_gym.recording_commands import Record, Replay
-from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, print_different
+from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, Robustness, print_different
 
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 """What a disk that is full or broken says."""
@@ -216,6 +216,7 @@ Commands = (
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Scenarios, tyro.conf.subcommand("scenarios")]
     | Annotated[Necessity, tyro.conf.subcommand("necessity")]
+    | Annotated[Robustness, tyro.conf.subcommand("robustness")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Doctor, tyro.conf.subcommand("doctor")]
 )

@@ -1,4 +1,4 @@
-"""The commands ``ablate``, ``ladder``, ``necessity`` and ``report``; see ``cli``."""
+"""The commands ``ablate``, ``ladder``, ``necessity``, ``robustness`` and ``report``; see ``cli``."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from tyro.conf import Fixed
 from fixation_gym.errors import check_names
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.experiments.necessity.config import NecessityConfig
+from fixation_gym.experiments.robustness.config import RobustnessConfig
 from fixation_gym.gl import select_backend
 from fixation_gym.names import Names
 
@@ -117,6 +118,26 @@ class Necessity(NecessityConfig):
 
         print(format_table(measure(self, self.out)["table"]))
         print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, TABLE_FILE, ROWS_FILE, FIGURE_FILE)))
+        return 0
+
+
+@dataclass(frozen=True)
+class Robustness(RobustnessConfig):
+    """The servo and its map under degraded pictures, times and poses, one by one. The same command again resumes."""
+
+    out: Path = Path("out/robustness")
+    """Folder of the results."""
+
+    def run(self) -> int:
+        """Measure and print the table."""
+        self.check()
+        select_backend()
+        from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.robustness.run import CSV_FILE, FIGURE_FILE, measure
+        from fixation_gym.experiments.robustness.statistics import format_table
+
+        print(format_table(measure(self, self.out)["rows"]))
+        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, FIGURE_FILE)))
         return 0
 
 

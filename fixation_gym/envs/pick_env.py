@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -27,6 +27,7 @@ from fixation_gym.types import FloatArray, ImageArray
 
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
+    from fixation_gym.envs.rendering import View
 
 RENDER_VIEWS = ("wrist", "front", "overlay")
 _EPISODE = ("scene", "percept", "camera_on", "_np_random", "_np_random_seed", "_noise_rng", "_errors", "_camera")
@@ -46,13 +47,12 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     | 3-5 | camera rotation rate w_X, w_Y, w_Z in the camera frame | 0.8 rad/s |
     | 6 | gripper: below 0 opens, above 0 closes, 0 holds | - |
 
-    **Observation** ``Dict``; vectors are float32. All but the image is of ``time``; so is the image, unless
-    ``sensor_noise`` gives the camera a delay or a clock of its own.
+    **Observation** ``Dict``; vectors are float32. All but the image is of ``time``.
 
     | key | shape | meaning |
     |---|---|---|
     | ``rgb`` | (H, W, 3) uint8 | wrist image, top-left origin |
-    | ``image_time`` | (1,) | when that was taken, s since reset, as the camera's stamp says |
+    | ``image_time`` | (1,) | when that was taken, by its stamp: ``time``, if the camera has no delay or clock |
     | ``joint_pos``, ``joint_vel`` | (7,) | arm joints, rad and rad/s |
     | ``gripper_width`` | (1,) | opening between the finger pads, m |
     | ``camera_pose`` | (7,) | position in m and quaternion (w, x, y, z) of the camera in the robot base frame |
@@ -128,20 +128,17 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         }
         self.metadata = self.metadata | {"render_fps": control_frequency}
         self.intrinsics = wrist_camera.intrinsics_of(self._image_size or config.IMAGE_SIZE, self.noise)
-        self.hand_eye = ROBOT.camera.hand_eye
-        self.control_frequency = control_frequency
+        self.hand_eye, self.control_frequency = ROBOT.camera.hand_eye, control_frequency
         self._reward_terms = rewards.choose_terms(reward, reward_weights)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
         self.observation_space = arguments.observation_space(self._image_size)
         self._limits = arguments.limits(self.observation_space)
-        self._running = False
-        self._sim: PickSim | None = None
+        self._running, self._sim = False, cast("PickSim | None", None)
         self._views = Views(self.intrinsics, renderer)
         self.percept: Percept | None = None
         """What whoever acts perceived in the last observation, if it says so: drawn into the overlay."""
         self.scene: SceneSpec | None = None
-        self._last_rgb: ImageArray = np.zeros((0, 0, 3), np.uint8)
-        self._image_time = 0.0
+        self._last_rgb, self._image_time = np.zeros((0, 0, 3), np.uint8), 0.0
         self.camera_on = True
         """While False, steps render nothing, and the last image and percept stay: for training, in grasps."""
 
@@ -160,9 +157,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self.sim.reset(self.scene)
         self._running = True
         self._steps = self._steps_lifted = 0
-        self._collided = False
-        self.percept = None
-        self.camera_on = True
+        self._collided, self.percept, self.camera_on = False, None, True
         self._target_box = target_box(self.scene.target, self.sim.arm_state().camera_pose, self.intrinsics)
         self._state = self._task_state()
         self._camera = wrist_camera.switched_on(self.noise, self.data.qpos, self.model.opt.timestep, self._noise_rng)
@@ -243,8 +238,13 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
 
     @property
     def picture_qpos(self) -> FloatArray:
-        """Configuration of the simulation at the stamp of the newest picture."""
-        return wrist_camera.configuration_at(self._camera, self._image_time)
+        """Configuration of the simulation in the middle of the newest picture's exposure."""
+        return wrist_camera.configuration_at(self._camera, self._image_time - self.noise.image_latency_s)
+
+    @property
+    def wrist_view(self) -> View:
+        """The wrist camera without its lens, for truth about its pictures."""
+        return self._views.view("observation", self.sim)
 
     @property
     def model(self) -> Any:

@@ -64,6 +64,25 @@ class ObstacleDepth:
         return depth
 
 
+class PictureTruth:
+    """What a picture truly showed, for judging maps: depth of the obstacles, and of the target."""
+
+    def __init__(self, view: View, model: Any) -> None:
+        """Borrow the GL context of a view of the wrist camera without a lens."""
+        self._obstacles = ObstacleDepth(view, model)
+        self._model, self._data = model, mujoco.MjData(model)
+        self._camera, self._target = model.camera(scene_mjcf.CAMERA_NAME).id, model.body("target").id
+
+    def look(self, qpos: FloatArray) -> tuple[FloatArray, float]:
+        """Depth of the nearest obstacle, shape (h, w), m, as in ``ObstacleDepth``, and of the target's centre, m."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
+        depth = self._obstacles.depth(self._data)
+        optical_axis = -self._data.cam_xmat[self._camera].reshape(3, 3)[:, 2]
+        offset = self._data.xpos[self._target] - self._data.cam_xpos[self._camera]
+        return depth, float(optical_axis @ offset)
+
+
 def nearer_map(depth: FloatArray, distance: float) -> ImageArray:
     """Share of each cell that shows something nearer than ``distance`` m, times 255, shape (32, 32)."""
     nearer = (depth < distance).astype(np.float32)

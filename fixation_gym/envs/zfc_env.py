@@ -166,7 +166,7 @@ class FixationPickZFC(FixationPickEnv):
         if self._truth is None:
             from fixation_gym.envs.privileged_map import ObstacleDepth
 
-            self._truth = ObstacleDepth(self._views.view("observation", self.sim), self.model)
+            self._truth = ObstacleDepth(self.wrist_view, self.model)
         return map_levels(self._truth.nearer(self.data, distance))
 
     def _perceived(self, sensed: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:

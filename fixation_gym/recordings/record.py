@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict, dataclass
@@ -17,10 +18,13 @@ from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import EPISODES_FILE, SUMMARY_FILE, ResultStore
+from fixation_gym.geometry.rigid import matrix_to_pose
+from fixation_gym.perception.pairing import PoseHistory
 from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.recordings.pictures import depth_over
 from fixation_gym.recordings.writer import LayoutWriter
-from fixation_gym.types import MaskArray
+from fixation_gym.replay.looks import Straightener
+from fixation_gym.types import FloatArray, MaskArray, Observation
 
 
 @dataclass(frozen=True)
@@ -95,32 +99,45 @@ def _record_episode(out: Path, cell: workers.Cell) -> dict[str, Any]:
     folder = f"{scenario}-{seed:06d}"
     obs, info = env.reset(seed=seed)
     policy.reset(seed)
+    straightener, history = Straightener(base.intrinsics), PoseHistory()
     box = np.asarray(base.sensed["target_box"], np.float64)
     notes = {
         "source": f"fixation-gym, scenario {scenario}, seed {seed}, policy {cell['policy']}",
         "poses": f"forward kinematics with sensor noise '{cell['sensor_noise']}'",
         "truth": "rendered depth, its median over the target's pixels",
     }
-    count, done = 0, False
+    count, last, done = 0, -math.inf, False
     with (
         closing(TruthView(base.model, base.intrinsics)) as view,
-        LayoutWriter(out / folder, base.intrinsics, notes, box if box.any() else None) as writer,
+        LayoutWriter(
+            out / folder, base.intrinsics.pinhole, notes, straightener.box(box) if box.any() else None
+        ) as writer,
     ):
         while not done:
             sensed = base.sensed
-            mask, depth = _truth(view, base)
-            pose, joints = (np.asarray(sensed[name], np.float64) for name in ("camera_pose", "joint_pos"))
-            time = float(sensed["time"][0])
-            writer.add(time, sensed["rgb"], pose, joints, mask, depth, depth_over(mask, depth))
-            count += 1
+            history = history.with_reading(Observation.from_dict(sensed))
+            stamp = float(sensed["image_time"][0])
+            if stamp > last:  # not the picture of the step before
+                mask, depth = _truth(view, base)
+                pose, joints = _at(stamp, sensed, history)
+                writer.add(stamp, straightener.image(sensed["rgb"]), pose, joints, mask, depth, depth_over(mask, depth))
+                count, last = count + 1, stamp
             obs, _, terminated, truncated, info = env.step(policy.act(obs))
             done = terminated or truncated
     outcome = bool(info["success"]), bool(info["collision"])
     return asdict(RecordedEpisode(scenario, seed, folder, count, *outcome))
 
 
+def _at(stamp: float, sensed: Mapping[str, Any], history: PoseHistory) -> tuple[FloatArray, FloatArray]:
+    """Camera pose (7,) at the stamp of a picture, and the joints (n,) then; none if they were read at another time."""
+    if stamp == float(sensed["time"][0]):
+        pose, joints = (np.asarray(sensed[name], np.float64) for name in ("camera_pose", "joint_pos"))
+        return pose, joints
+    return matrix_to_pose(history.at(stamp)[0]), np.full(len(sensed["joint_pos"]), math.nan)
+
+
 def _truth(view: Any, base: Any) -> tuple[MaskArray, Float32Array]:
-    """Pixels of the target and depth now, both of shape (H, W). A picture is older by the latency of its noise."""
-    truth = view.look(base.data.qpos)
+    """Pixels of the target and depth in the newest picture, without its lens, both of shape (H, W)."""
+    truth = view.look(base.picture_qpos)
     owners = np.array([*(base.model.body(body).name for body in base.model.geom_bodyid), ""])  # -1: nothing
     return owners[truth.geom] == "target", truth.depth.astype(np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -61,7 +62,8 @@ class LayoutWriter:
         row[DEPTH_COLUMN] = "" if depth is None else self._picture("depth", name, _in_steps(depth))
         row[MASK_COLUMN] = "" if mask is None else self._picture("mask", name, mask * np.uint8(255))
         row[DISTANCE_COLUMN] = "" if distance_true_m is None else distance_true_m
-        row |= {f"{JOINT_PREFIX}{joint}": angle for joint, angle in enumerate(joint_pos.tolist(), start=1)}
+        angles = ["" if math.isnan(angle) else angle for angle in joint_pos.tolist()]
+        row |= {f"{JOINT_PREFIX}{joint}": angle for joint, angle in enumerate(angles, start=1)}
         self._rows.append(row)
 
     def _picture(self, kind: str, name: str, pixels: np.ndarray) -> str:

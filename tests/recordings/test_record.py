@@ -109,3 +109,26 @@ def test_a_finished_episode_is_not_recorded_again(recorded):
     assert summary["pictures"] == 2 * STEPS
     assert (recorded / "opaque-000000" / "frames.csv").stat().st_mtime_ns == before
     assert len(open_recording(recorded / "opaque-000001")) == STEPS
+
+
+def test_late_pictures_are_recorded_once_with_the_pose_and_truth_of_their_time(tmp_path):
+    import gymnasium as gym
+
+    from fixation_gym.recordings.record import record
+
+    spec = gym.spec("FixationPick-v0")
+    before, spec.max_episode_steps = spec.max_episode_steps, STEPS
+    try:
+        record(dataclasses.replace(CONFIG, sensor_noise="realistic"), tmp_path / "set")
+    finally:
+        spec.max_episode_steps = before
+    frames = list(open_recording(tmp_path / "set" / "opaque-000000"))
+    times = np.array([frame.time for frame in frames])
+    assert np.all(np.diff(times) > 0.02)  # 30 pictures per second
+    assert times[0] < 0.0
+    assert all(frame.joint_pos is None for frame in frames)
+    assert frames[0].image().shape == (*SMALL, 3)
+    # The truth is that of the picture: red where the mask is, also while the camera swings.
+    for frame in frames:
+        red = frame.image()[frame.mask()].astype(float)
+        assert np.median(red[:, 0] - red[:, 1]) > 60
