@@ -1,11 +1,15 @@
 """What a box names is followed through made-up sequences whose every pixel is known."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.geometry.rigid import inverse, look_at, matrix_to_pose, transform
 from fixation_gym.perception.detection.box_tracker import BoxTracker
+from fixation_gym.perception.detection.detector import Sighting
 from fixation_gym.perception.detection.segmentation import segmentation_of
 from fixation_gym.perception.detection.tracking import FIRST_LOOK, Expectation
 from fixation_gym.types import Observation
@@ -124,3 +128,63 @@ def test_after_its_place_was_forgotten_it_is_found_at_another_size_but_not_where
         assert not watch.look(other).any()
     image, true = drawn(table(1), (220, 90), 30)
     assert overlap([watch.look(image) for _ in range(4)][-1], true) > 0.85
+
+
+@pytest.mark.parametrize("error", [(0, 0, 1.2), (0, 0, 0.8), (-0.2, 0, 1.0), (0.15, 0.15, 1.0), (0, -0.2, 1.0)])
+def test_a_box_that_is_a_fifth_too_large_too_small_or_beside_it_shows_the_same(error):
+    right, down, size = error
+    image, true = drawn(table(), (160, 120), 24)
+    side = size * 49
+    box = np.array([159.5 + 49 * right - side / 2, 119.5 + 49 * down - side / 2, side, side])
+    assert overlap(BoxTracker(CAMERA).detect(observation(image, target_box=box), FIRST_LOOK), true) > 0.9
+
+
+# -- a pattern that goes on beyond the box --------------------------------------------------------------------------
+
+BOARD = np.kron(np.indices((8, 11)).sum(axis=0) % 2, np.ones((20, 20))).astype(np.uint8) * 170 + 40  # 1 px is 1 mm
+BOX_MM = np.array([[40, 40], [179, 40], [179, 119], [40, 119]], float)
+
+
+def board_seen_from(pose):
+    """Picture of a chessboard that lies in the plane z = 0 of base, and the pixels of its middle part."""
+    T = inverse(pose)
+    corner = np.array([-0.11, -0.08, 0.0])  # of the board, in base
+    columns = [0.001 * T[:3, 0], 0.001 * T[:3, 1], transform(T, corner)]
+    homography = CAMERA.matrix @ np.column_stack(columns)
+    rim = np.pad(BOARD, 12, constant_values=225)
+    to_rim = homography @ np.array([[1.0, 0.0, -12.0], [0.0, 1.0, -12.0], [0.0, 0.0, 1.0]])
+    image = cv2.cvtColor(table(), cv2.COLOR_RGB2GRAY)
+    cv2.warpPerspective(rim, to_rim, (320, 240), dst=image, flags=cv2.INTER_AREA, borderMode=cv2.BORDER_TRANSPARENT)
+    corners = cv2.perspectiveTransform(BOX_MM[None], homography)[0]
+    mask = cv2.fillConvexPoly(np.zeros((240, 320), np.uint8), np.rint(corners).astype(np.int32), 1) > 0
+    return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), mask
+
+
+STILLS = [
+    look_at(np.array(place), np.array(gaze), up)
+    for place, gaze, up in (
+        ([0.0, -0.02, 0.42], [0.0, 0.0, 0.0], np.array([0.0, 1.0, 0.0])),
+        ([0.10, -0.10, 0.45], [0.01, 0.02, 0.0], np.array([0.0, 1.0, 0.0])),
+        ([-0.16, 0.05, 0.40], [-0.03, 0.0, 0.0], np.array([1.0, 0.2, 0.0])),
+        ([0.05, 0.2, 0.38], [0.0, -0.02, 0.0], np.array([-0.5, 1.0, 0.0])),
+        ([0.0, -0.22, 0.5], [0.04, 0.02, 0.0], np.array([0.0, 1.0, 0.0])),
+    )
+]
+
+
+def test_part_of_a_repeated_pattern_is_found_in_stills_by_how_the_camera_moved_between_them():
+    tracker = BoxTracker(CAMERA)
+    for step, pose in enumerate(STILLS):
+        image, true = board_seen_from(pose)
+        box = np.array(cv2.boundingRect(true.view(np.uint8)), float) if step == 0 else None
+        seen = observation(image, 0.5 * step, target_box=box)
+        found = tracker.detect(replace(seen, camera_pose=matrix_to_pose(pose)), FIRST_LOOK)
+        if step == 0:
+            assert overlap(found, true) > 0.95
+            continue
+        assert isinstance(found, Sighting)
+        assert overlap(found.mask, true) > 0.85, step
+        x, y, z = transform(inverse(pose), np.array([-0.0005, -0.0005, 0.0]))
+        np.testing.assert_allclose(found.point, [x / z, y / z], atol=1.5 / CAMERA.fx)
+    seen = observation(table(1), 3.0)
+    assert not np.any(tracker.detect(replace(seen, camera_pose=matrix_to_pose(STILLS[0])), FIRST_LOOK))

@@ -10,6 +10,7 @@ import pytest
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception import ColourDetector, GivenMasks, Perception
 from fixation_gym.perception.detection.box_tracker import BoxTracker
+from fixation_gym.perception.detection.detector import Sighting
 from fixation_gym.perception.detection.first_look import checked_box
 from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.detection.tracking import FIRST_LOOK, Expectation
@@ -81,6 +82,22 @@ def test_an_answer_that_is_no_mask_of_the_image_is_refused_in_one_sentence(answe
     with pytest.raises(ValueError, match=r"Wrong must return a bool array of shape \(120, 160\), got ") as error:
         Perception(CAMERA, detector=Wrong()).update(observation(grass()))
     assert str(error.value).endswith(found)
+
+
+def test_a_detector_that_follows_a_point_says_where_it_is_and_how_surely():
+    class Pointing(Whole):
+        point, std = np.array([0.1, -0.05]), 1e-3
+
+        def detect(self, observation, expected):
+            return Sighting(super().detect(observation, expected), self.point, self.std)
+
+    pointing = Pointing()
+    seen = Perception(CAMERA, detector=pointing).update(observation(grass())).segmentation
+    np.testing.assert_array_equal(seen.centroid, [0.1, -0.05])
+    assert seen.centroid_std == 1e-3
+    for pointing.point, pointing.std in ((np.zeros(3), 1e-3), (np.array([np.nan, 0.0]), 1e-3), (np.zeros(2), 0.0)):
+        with pytest.raises(ValueError, match="Pointing must give a finite point"):
+            Perception(CAMERA, detector=pointing).update(observation(grass()))
 
 
 def test_a_stranger_s_exception_keeps_its_traceback_and_says_whose_code_it_was():

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.detection.colour_model import confusion
 from fixation_gym.perception.detection.coloured_shape import ColouredShape, first_shape
-from fixation_gym.perception.detection.first_look import checked_box, cut_out
+from fixation_gym.perception.detection.detector import Sighting
+from fixation_gym.perception.detection.first_look import box_filled, checked_box, cut_out
+from fixation_gym.perception.detection.flat_patch import FlatPatch, first_patch
 from fixation_gym.perception.detection.picture import picture_of, working_camera
 from fixation_gym.perception.detection.shape_settings import ShapeSettings
 from fixation_gym.perception.detection.tracking import Expectation
@@ -24,6 +27,8 @@ class BoxTrackerSettings:
     """Larger images are halved until they are no wider, px."""
     surroundings: float = 0.8
     """What lies within this share of the box around it is compared with what it holds."""
+    confusion: float = 0.2
+    """If more pixels than this share are on the wrong side by their colours, the box is followed as a flat pattern."""
     shape: ShapeSettings = field(default_factory=ShapeSettings)
     """Of what its colours tell from its surroundings."""
 
@@ -39,9 +44,9 @@ class BoxTracker:
 
     def reset(self) -> None:
         """Forget what the target looks like."""
-        self._known: ColouredShape | None = None
+        self._known: ColouredShape | FlatPatch | None = None
 
-    def detect(self, observation: Observation, expected: Expectation) -> MaskArray:
+    def detect(self, observation: Observation, expected: Expectation) -> MaskArray | Sighting:
         """Pixels of the target, shape (H, W); none while it is lost.
 
         Raises:
@@ -52,13 +57,23 @@ class BoxTracker:
         if self._known is None:
             box = checked_box(observation.target_box, self._full)
             mask = cut_out(observation.rgb, box, self._settings.surroundings)
-            self._known = first_shape(picture, self._resized(mask), self._settings.shape)
+            if confusion(picture.rgb, self._resized(mask)) < self._settings.confusion:
+                self._known = first_shape(picture, self._resized(mask), self._settings.shape)
+            else:
+                mask = box_filled(shape, box)
+                self._known = first_patch(picture, self._resized(mask))
             return mask
-        self._known, mask = self._known.followed(picture, expected)
-        return mask if mask.shape == shape else cv2.resize(mask.view(np.uint8) * 255, shape[::-1]) > 127
+        self._known, found = self._known.followed(picture, expected)
+        if isinstance(found, Sighting):
+            return replace(found, mask=_enlarged(found.mask, shape))
+        return _enlarged(found, shape)
 
     def _resized(self, mask: MaskArray) -> MaskArray:
         size = (self._camera.width, self._camera.height)
         if mask.shape[::-1] == size:
             return mask
         return cv2.resize(mask.view(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127
+
+
+def _enlarged(mask: MaskArray, shape: tuple[int, int]) -> MaskArray:
+    return mask if mask.shape == shape else cv2.resize(mask.view(np.uint8) * 255, shape[::-1]) > 127

@@ -5,6 +5,7 @@ Value in, value out.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -22,6 +23,9 @@ _UNSEEN_ON, _UNSEEN_AROUND = 1e-4, 1e-3
 """Share of an unseen colour on a thing and around it: what was never seen is rather not the thing."""
 _MOST = 3.0
 """What one pixel can say at most, natural logarithm of how much likelier it is on the thing."""
+
+_NEAR = 0.3
+"""Close around a thing: within this share of its size."""
 
 BinArray = NDArray[np.int32]
 Histogram = NDArray[np.float32]
@@ -58,6 +62,16 @@ def histogram(bins: BinArray) -> Histogram:
     counts = np.bincount(bins, minlength=int(np.prod(_BINS))).astype(np.float32).reshape(_BINS)
     smooth = gaussian_filter(counts, _SMOOTHING, mode="nearest", truncate=2.0)
     return np.asarray(smooth, np.float32).ravel() / np.float32(max(1, bins.size))
+
+
+def confusion(rgb: ImageArray, mask: MaskArray) -> float:
+    """Share of pixels that their colours put on the wrong side: those of a thing and those close around it, 0..0.5."""
+    near = max(4, round(_NEAR * math.sqrt(np.count_nonzero(mask))))
+    pixels, bins = mask.view(np.uint8), colour_bins(rgb)
+    grown, gap = (cv2.dilate(pixels, np.ones((2 * side + 1,) * 2, np.uint8)) > 0 for side in (near, 3))
+    on, around = histogram(bins[mask]), histogram(bins[grown & ~gap])
+    likelier = on > around
+    return 0.5 * float(on[~likelier].sum() + around[likelier].sum())
 
 
 def first_model(bins: BinArray, thing: MaskArray, around: MaskArray) -> ColourModel:

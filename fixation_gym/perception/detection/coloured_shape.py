@@ -148,8 +148,8 @@ class ColouredShape:
         left, top, right, bottom = box
         margin = 0.2 * max(right - left, bottom - top) + 4.0
         x, y = math.floor(left - margin), math.floor(top - margin)
-        columns, rows = slice(x, math.ceil(right + margin)), slice(y, math.ceil(bottom + margin))
-        return np.array([x, y], np.float64), moved_mask(self.shape, affine, (rows, columns))
+        part = slice(y, math.ceil(bottom + margin)), slice(x, math.ceil(right + margin))
+        return np.array([x, y], np.float64), moved_mask(self.shape, affine, part)
 
     def _found_anywhere(self, picture: Picture) -> _Sight | None:
         """Where colours fit it best in the whole image, at any size."""
@@ -163,9 +163,10 @@ class ColouredShape:
         for scale in _SCALES:
             scaled = similarity(centre, centre, 0.0, scale * was)
             small = after(half, scaled)
-            if max(box_of(self.shape, small)[2:] - box_of(self.shape, small)[:2]) > scores.shape[0]:
+            box = box_of(self.shape, small)
+            if np.max(box[2:] - box[:2]) > scores.shape[0]:
                 continue
-            corner, template = self._template(box_of(self.shape, small), small)
+            corner, template = self._template(box, small)
             contrast, shift = best_fit(scores, template, corner, math.inf)
             if contrast > best:
                 best, affine = contrast, shifted(scaled, 2.0 * shift)
@@ -218,15 +219,8 @@ class ColouredShape:
         must = self.area * scale**2
         seen_area = float(np.count_nonzero(found))
         ratio = seen_area / max(1.0, must)
-        now = replace(
-            self,
-            affine=sight.affine,
-            area=must,
-            centroid=seen.centroid,
-            size=_size(seen),
-            rotation=picture.rotation,
-            lost=False,
-        )
+        now = replace(self, affine=sight.affine, area=must, centroid=seen.centroid, size=_size(seen))
+        now = replace(now, rotation=picture.rotation, lost=False)
         if anywhere or not self.settled:
             settled = not seen.touches_border and abs(math.log(ratio)) < settings.settled
             return replace(now, shape=seen.mask, affine=_STILL, view=view, area=seen_area, settled=settled)
@@ -286,7 +280,7 @@ def first_shape(picture: Picture, mask: MaskArray, settings: ShapeSettings) -> C
 
 
 def _margin(box: FloatArray, settings: ShapeSettings) -> float:
-    return settings.surroundings * float(max(box[2] - box[0], box[3] - box[1])) + 4.0
+    return settings.surroundings * float(np.max(box[2:] - box[:2])) + 4.0
 
 
 def _smooth(scores: ScoreArray) -> ScoreArray:

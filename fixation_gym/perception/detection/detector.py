@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -9,7 +11,19 @@ import numpy as np
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.detection.segmentation import Segmentation, segmentation_of
 from fixation_gym.perception.detection.tracking import Expectation
-from fixation_gym.types import MaskArray, Observation
+from fixation_gym.types import FloatArray, MaskArray, Observation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """A mask, and where one and the same point of the target is, from a detector that follows one."""
+
+    mask: MaskArray
+    """Pixels of the target, shape (H, W), bool."""
+    point: FloatArray
+    """Normalised image coordinates of that point, shape (2,); taken in place of the mean of the mask."""
+    point_std: float
+    """Standard deviation of each coordinate."""
 
 
 class Detector(Protocol):
@@ -19,7 +33,7 @@ class Detector(Protocol):
         """Forget the last episode."""
         ...
 
-    def detect(self, observation: Observation, expected: Expectation) -> MaskArray:
+    def detect(self, observation: Observation, expected: Expectation) -> MaskArray | Sighting:
         """Find the target in one image.
 
         Args:
@@ -27,7 +41,7 @@ class Detector(Protocol):
             expected: where the target should be, by what was seen of it before and how the camera moved since.
 
         Returns:
-            Pixels of the target, shape (H, W), bool; all False if it is not in the image.
+            Pixels of the target, shape (H, W), bool; all False if it is not in the image. Or a ``Sighting``.
         """
         ...
 
@@ -60,14 +74,23 @@ def detected(
     """
     name = f"{type(detector).__module__}.{type(detector).__qualname__}"
     try:
-        mask = detector.detect(observation, expected)
+        found = detector.detect(observation, expected)
     except Exception as error:
         if name.startswith("fixation_gym."):
             raise
         raise RuntimeError(f"the detector {name} failed: {type(error).__name__}: {error}") from error
+    mask = found.mask if isinstance(found, Sighting) else found
     expects = f"the detector {name} must return a bool array of shape {(intrinsics.height, intrinsics.width)}"
     if not isinstance(mask, np.ndarray):
         raise ValueError(f"{expects}, got {type(mask).__name__}")
     if mask.dtype != np.bool_ or mask.shape != (intrinsics.height, intrinsics.width):
         raise ValueError(f"{expects}, got {mask.dtype} of shape {mask.shape}")
-    return segmentation_of(mask.copy(), intrinsics)  # which makes it read-only
+    seen = segmentation_of(mask.copy(), intrinsics)  # which makes it read-only
+    if not (seen.visible and isinstance(found, Sighting)):
+        return seen
+    point = np.array(found.point, np.float64)
+    if point.shape != (2,) or not (np.isfinite(point).all() and 0.0 < found.point_std < math.inf):
+        raise ValueError(
+            f"the detector {name} must give a finite point and std, got {found.point} and {found.point_std}"
+        )
+    return replace(seen, centroid=point, centroid_std=float(found.point_std))

@@ -30,6 +30,9 @@ class Segmentation:
     """Share of the image that the mask covers."""
     touches_border: bool
     """Whether the mask reaches the image border, so that its centroid is not the one of the whole target."""
+    centroid_std: float | None = None
+    """Standard deviation of the centroid if the detector followed one point of the target, whatever of it is seen,
+    normalised coordinates; None: it is the mean of the mask."""
 
     @property
     def whole(self) -> bool:

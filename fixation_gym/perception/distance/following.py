@@ -79,13 +79,14 @@ def follow_poses(
     if not seen.visible:
         return state, covering
     if state is None:
-        return distance.initialise(seen.centroid, T_base_cam, settings, _size(seen), seen.touches_border), covering
-    state = distance.update(state, seen.centroid, T_base_cam, settings, _size(seen), seen.touches_border)
-    return state, covering
+        return distance.initialise(seen.centroid, T_base_cam, settings, *_noise(seen)), covering
+    return distance.update(state, seen.centroid, T_base_cam, settings, *_noise(seen)), covering
 
 
 def _slide(state: DistanceState, before: Frame, now: Frame, settings: DistanceSettings) -> float:
-    """Slide of the centroid since the frame before, normalised coordinates."""
+    """Slide of the centroid since the frame before, normalised coordinates; a point that is followed does not slide."""
+    if now.segmentation.centroid_std is not None:
+        return 0.0
     _, _, point = distance.distance_at(state, now.T_base_cam, settings)
     was, is_ = (point - frame.T_base_cam[:3, 3] for frame in (before, now))
     lengths = math.sqrt(was @ was), math.sqrt(is_ @ is_)
@@ -123,12 +124,17 @@ def mended(own: InverseDepth, middle: Frame, last: Frame, settings: DistanceSett
     point = transform(middle.T_base_cam, depth * np.array([*middle.segmentation.centroid, 1.0]))
     now = float(transform(inverse(last.T_base_cam), point)[2])
     seen, std = last.segmentation, own[1] * depth**2
-    return distance.restart(seen.centroid, last.T_base_cam, now, std, settings, _size(seen), seen.touches_border)
+    return distance.restart(seen.centroid, last.T_base_cam, now, std, settings, *_noise(seen))
 
 
 def _size(seen: Segmentation) -> float:
     """Standard deviation of the target's pixels about their centroid, normalised coordinates."""
     return math.sqrt(mean_variance(seen))
+
+
+def _noise(seen: Segmentation) -> tuple[float, bool, float | None]:
+    """What the noise of the centroid depends on, as the filter takes it."""
+    return _size(seen), seen.touches_border, seen.centroid_std
 
 
 def mean_variance(seen: Segmentation) -> float:

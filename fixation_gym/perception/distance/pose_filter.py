@@ -101,6 +101,7 @@ def initialise(
     settings: DistanceSettings,
     image_std: float = 0.0,
     touches_border: bool = False,
+    centroid_std: float | None = None,
 ) -> DistanceState:
     """Start at the first sight of the object, with the prior distance.
 
@@ -110,9 +111,10 @@ def initialise(
         settings: prior and noise.
         image_std: as for ``update``.
         touches_border: as for ``update``.
+        centroid_std: as for ``update``.
     """
     rho = 1.0 / settings.initial_distance_m
-    ray_std = _ray_std(settings, image_std, touches_border)
+    ray_std = _ray_std(settings, image_std, touches_border, centroid_std)
     variances = [ray_std**2, ray_std**2, (settings.initial_relative_std * rho) ** 2]
     return DistanceState(np.array(T_base_cam), np.array([*centroid, rho]), np.diag(variances))
 
@@ -149,6 +151,7 @@ def update(
     settings: DistanceSettings,
     image_std: float = 0.0,
     touches_border: bool = False,
+    centroid_std: float | None = None,
 ) -> DistanceState:
     """Take in one centroid by three Gauss-Newton steps; reject outliers, restart when they persist or it runs far off.
 
@@ -159,11 +162,12 @@ def update(
         settings: noise and gates.
         image_std: standard deviation of the object's pixels about the centroid, normalised coordinates.
         touches_border: whether the object is cut by the image border.
+        centroid_std: standard deviation of the centroid, normalised coordinates, if whoever found it knows.
     """
     view = view_rows(state.T_base_anchor, T_base_cam)
     prior = tuple(state.mean.tolist())
     seen = (float(centroid[0]), float(centroid[1]))
-    noise = _ray_std(settings, image_std, touches_border) ** 2 + (prior[2] * settings.position_std_m) ** 2
+    noise = _ray_std(settings, image_std, touches_border, centroid_std) ** 2 + (prior[2] * settings.position_std_m) ** 2
     cov = state.cov.tolist()
     mean, nis, gain, jacobian = correction(view, prior, prior, cov, seen, noise)
     if nis > settings.gate:
@@ -172,14 +176,14 @@ def update(
             depth, std, _ = distance_at(state, T_base_cam, settings)
             depth = min(depth, settings.farthest_m)
             std = math.hypot(std, settings.jump_std_m)
-            return restart(centroid, T_base_cam, depth, std, settings, image_std, touches_border)
+            return restart(centroid, T_base_cam, depth, std, settings, image_std, touches_border, centroid_std)
         return replace(state, nis=nis, rejected=rejected)
     for _ in range(2):
         mean, _, gain, jacobian = correction(view, prior, mean, cov, seen, noise)
     gains = np.array(gain)  # (3, 2)
     keep = _IDENTITY - gains @ np.array(jacobian)
     if mean[2] < 1.0 / settings.farthest_m:
-        return initialise(centroid, T_base_cam, settings, image_std, touches_border)
+        return initialise(centroid, T_base_cam, settings, image_std, touches_border, centroid_std)
     posterior = keep @ state.cov @ keep.T + noise * (gains @ gains.T)  # Joseph form: stays positive
     return DistanceState(state.T_base_anchor, np.array(mean), posterior, nis, 0)
 
@@ -242,8 +246,10 @@ def fixation_at(
     return Fixation(visible, np.array(centroid), point, depth, std, state.nis, True)
 
 
-def _ray_std(settings: DistanceSettings, image_std: float, touches_border: bool) -> float:
+def _ray_std(settings: DistanceSettings, image_std: float, touches_border: bool, centroid_std: float | None) -> float:
     """Standard deviation of a centroid in normalised coordinates, without the position noise."""
+    if centroid_std is not None:
+        return math.hypot(centroid_std, settings.rotation_std_rad)
     share = settings.border_std_size if touches_border else settings.centroid_std_size
     terms = (settings.centroid_std_px / _REFERENCE_FOCAL_PX, settings.rotation_std_rad, share * image_std)
     return math.hypot(*terms)
@@ -257,9 +263,10 @@ def restart(
     settings: DistanceSettings,
     image_std: float = 0.0,
     touches_border: bool = False,
+    centroid_std: float | None = None,
 ) -> DistanceState:
     """Begin again where the object is seen now, with its depth and standard deviation from elsewhere, m."""
-    fresh = initialise(centroid, T_base_cam, settings, image_std, touches_border)
+    fresh = initialise(centroid, T_base_cam, settings, image_std, touches_border, centroid_std)
     rho = 1.0 / max(depth, MIN_DEPTH_M)
     cov = fresh.cov.copy()
     cov[2, 2] = min(std * rho**2, settings.initial_relative_std * rho) ** 2
