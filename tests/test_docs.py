@@ -59,3 +59,21 @@ def test_every_scenario_has_its_picture_on_the_page_of_scenarios():
     pictures = [ROOT / "docs" / "images" / "scenarios" / f"{name}.jpg" for name in SCENARIO_NAMES]
     assert all(f"(images/scenarios/{picture.name})" in page for picture in pictures)
     assert sum(picture.stat().st_size for picture in pictures) < 2e6
+
+
+def test_the_readme_is_short_and_begins_with_what_one_can_do():
+    lines = (ROOT / "README.md").read_text().splitlines()
+    assert len(lines) < 120
+    first_screen = "\n".join(lines[:45])
+    assert all(part in first_screen for part in ("hero.gif", "make demo", "make test", "```python", "| the paper |"))
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("page", ["README.md", "docs/start.md"])
+def test_the_ten_lines_of_a_page_lift_the_target(page, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
+    names = {"__name__": "ten_lines"}
+    exec(compile(code, page, "exec"), names)
+    names["env"].close()
+    assert names["info"]["is_success"]
+    assert "phase=" in capsys.readouterr().out
