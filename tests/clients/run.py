@@ -53,7 +53,7 @@ CLIENTS = (
         "Gymnasium",
         "gymnasium",
         ("gymnasium[other]",),
-        "`check_env`, `make_vec` (one process and several), `RecordVideo`, `RecordEpisodeStatistics`",
+        "`check_env`, `make_vec` in one process and several, `RecordVideo` and others",
     ),
     Client("SB3", "stable-baselines3", (), "`PPO` in two processes, `SAC`, `evaluate_policy`, saved and loaded"),
     Client("sb3-contrib", "sb3-contrib", ("sb3-contrib",), "`TQC`, `RecurrentPPO`"),
