@@ -77,3 +77,17 @@ def test_the_ten_lines_of_a_page_lift_the_target(page, capsys):
     names["env"].close()
     assert names["info"]["is_success"]
     assert "phase=" in capsys.readouterr().out
+
+
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    *(ROOT / "docs").glob("*.md"),
+    *(ROOT / "docs" / "doors").glob("*.md"),
+]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_lines_of_pages_are_of_120_columns_at_most(page):
+    long = [line for line in page.read_text().splitlines() if len(line) > 120]
+    assert not long
