@@ -79,6 +79,21 @@ def test_the_ten_lines_of_a_page_lift_the_target(page, capsys):
     assert "phase=" in capsys.readouterr().out
 
 
+def test_every_command_has_a_row_on_the_page_of_commands():
+    commands = re.findall(r'subcommand\("(\w+)"\)', (ROOT / "fixation_gym" / "cli.py").read_text())
+    rows = re.findall(r"^\| `(\w+)", (ROOT / "docs" / "commands.md").read_text(), re.MULTILINE)
+    assert sorted(rows) == sorted(commands)
+
+
+def test_make_help_lists_every_target():
+    makefile = (ROOT / "Makefile").read_text()
+    targets = re.findall(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)[0].split()
+    described = [
+        name for names in re.findall(r"^([a-z][a-z_ -]*):[^#\n]*# ", makefile, re.MULTILINE) for name in names.split()
+    ]
+    assert sorted(described) == sorted(targets)
+
+
 PAGES = [
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",
