@@ -13,6 +13,7 @@ import fixation_gym
 from fixation_gym.envs import config
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.rewards import RewardWeights
+from fixation_gym.envs.sensor_noise import SENSOR_NOISE, SensorNoise
 from fixation_gym.envs.zfc_env import FixationPickZFC
 from fixation_gym.envs.zfc_observation import OBSERVATIONS
 from fixation_gym.robots import ROBOT
@@ -128,11 +129,14 @@ def test_the_table_of_scenario_fields():
 
 
 def test_the_table_of_noise():
-    table = rows(section("Sensor noise"))
-    assert [name_in(row[0]) for row in table] == [field.name for field in fields(config.SensorNoise)]
-    for name, *values, _ in table:
-        told = [float(value) for value in values]
-        assert told == [getattr(preset, name_in(name)) for preset in config.SENSOR_NOISE.values()]
+    table = {name_in(row[0]): row[1:-1] for row in rows(section("Sensor noise"))}
+    assert list(table) == [field.name for field in fields(SensorNoise)]
+    lens = table.pop("lens")
+    assert [cell != "none" for cell in lens] == [bool(preset.lens) for preset in SENSOR_NOISE.values()]
+    assert all(f"{value:g}" in section("Sensor noise") for value in SENSOR_NOISE["realistic"].lens)
+    for name, values in table.items():
+        kept = [getattr(preset, name) for preset in SENSOR_NOISE.values()]
+        assert [float(value) for value in values] == pytest.approx(kept, rel=1e-3), name
 
 
 @pytest.mark.sim
