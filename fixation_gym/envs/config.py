@@ -211,8 +211,8 @@ SCENARIOS: dict[str, Scenario] = {
             ("opaque", "translucent", "wire"),
             first_kinds=("bin",),
             obstacle_count=(2, 6),
-            free_elevation_deg=_reached(46.0, 82.0),
-            free_azimuth_shape=(1.3, 1.1),
+            free_elevation_deg=_reached(42.0, 80.0),
+            free_azimuth_shape=(1.25, 1.0),
         ),
         Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
         Scenario(

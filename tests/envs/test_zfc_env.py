@@ -202,7 +202,7 @@ def test_a_grasp_of_nothing_ignores_actions_backs_off_and_hands_back_control(opa
 
 
 def test_before_the_object_was_seen_the_camera_searches_and_the_trigger_does_nothing(opaque, monkeypatch):
-    monkeypatch.setattr(Views, "light", lambda self, sim, qpos: np.full((*SMALL, 3), 128, np.uint8))
+    monkeypatch.setattr(Views, "light", lambda self, sim, rng, qpos: np.full((*SMALL, 3), 128, np.uint8))
     env = opaque("blind")
     env.reset(seed=0)
     for _ in range(10):
