@@ -86,7 +86,7 @@ def test_what_is_deeper_in_a_corridor_counts_more():
     np.testing.assert_allclose(counted, [30.0, 20.0, 10.0, 0.0])
 
 
-def test_what_was_never_looked_at_is_shunned_and_so_is_what_was_tried():
+def test_what_was_never_looked_at_costs_more_and_so_does_what_was_tried():
     present = way_at(60, 60)
     nothing, everything = (
         known_ways(NONE, np.zeros(0), TARGET, s, 0.01) for s in (SeenSpace.empty(0), everything_seen())

@@ -77,7 +77,7 @@ def test_a_hidden_target_stays_where_it_was_and_the_filter_goes_on_from_there():
     assert back.distance_std_m < 2.0 * hidden.distance_std_m
 
 
-def test_an_estimate_beyond_reach_begins_anew_and_comes_back():
+def test_an_estimate_beyond_reach_begins_again_and_comes_back():
     perception = Perception(CAMERA, CONSTRAINED, estimator=TwistEstimator())
     follow(perception, range(25))
     lost, _ = follow(perception, range(25, 50), rotation=0.0)  # translation without rotation: infinitely far

@@ -97,7 +97,7 @@ def test_the_distance_from_the_centroid_holds_unless_the_motion_contradicts_it_o
 @pytest.mark.parametrize("v_z", [0.0, 0.05])
 def test_a_target_that_nothing_covers_never_restarts_the_distance(v_z, monkeypatch):
     restarts = []
-    monkeypatch.setattr(estimator, "mended", lambda *given: restarts.append(given))
+    monkeypatch.setattr(estimator, "begun_again", lambda *given: restarts.append(given))
     scene = Scene([r for number, r in enumerate(poster_scene().rectangles) if number < 2])
     run(frames(scene, partial(circling, v_z=v_z)), 40)
     assert not restarts

@@ -22,7 +22,13 @@ from fixation_gym.perception.distance.calibrating_filter import CalibratingSetti
 from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze, ConstraintSettings, gaze_drift
 from fixation_gym.perception.distance.flow_filters import FlowFilterState, FlowSamples, Kind
 from fixation_gym.perception.distance.flow_samples import edge_samples
-from fixation_gym.perception.distance.following import Frame, follow_constraint, follow_poses, mean_variance, mended
+from fixation_gym.perception.distance.following import (
+    Frame,
+    begun_again,
+    follow_constraint,
+    follow_poses,
+    mean_variance,
+)
 from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState, Fixation
 from fixation_gym.perception.distance.target_motion import InverseDepth, contradiction, target_inverse_depth
 from fixation_gym.perception.flow.optic_flow import Flow
@@ -115,7 +121,7 @@ class PoseEstimator:
         depth, std, _ = pose_filter.distance_at(self._state, middle.T_base_cam, self._settings)
         own = contradiction((1.0 / depth, std / depth**2), recent, covered)
         if own is not None:
-            self._state = mended(own, middle, last, self._settings)
+            self._state = begun_again(own, middle, last, self._settings)
             self._own_depths.clear()
 
     def fixation(self, T_base_cam: FloatArray, seen: Segmentation | None) -> Fixation:

@@ -118,7 +118,7 @@ def follow_constraint(
     return fixation_constraint.anchored(gaze, T_base_cam, settings), gaze
 
 
-def mended(own: InverseDepth, middle: Frame, last: Frame, settings: DistanceSettings) -> DistanceState:
+def begun_again(own: InverseDepth, middle: Frame, last: Frame, settings: DistanceSettings) -> DistanceState:
     """The pose filter begun again in the last frame, with the target's inverse depth in the middle one."""
     depth = 1.0 / own[0]
     point = transform(middle.T_base_cam, depth * np.array([*middle.segmentation.centroid, 1.0]))
