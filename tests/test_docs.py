@@ -68,6 +68,28 @@ def test_the_readme_is_short_and_begins_with_what_one_can_do():
     assert all(part in first_screen for part in ("hero.gif", "make demo", "make test", "```python", "| the paper |"))
 
 
+@pytest.mark.parametrize(
+    ("in_readme", "page", "in_page"),
+    [
+        ("0.12 mm; with the paper's filter 0.95 mm", "distance", "filter (`pose`) | 0.12 mm |"),
+        ("0.12 mm; with the paper's filter 0.95 mm", "distance", "twist and flow) | 0.95 mm |"),
+        ("1.4 mm; with the paper's filter 31 mm", "distance", "0.12 mm | 1.4 mm |"),
+        ("1.4 mm; with the paper's filter 31 mm", "distance", "0.95 mm | 31 mm |"),
+        ("not reproduced: 110 %", "distance", "1.1 at 2 m with the 5 cm circle"),
+        ("99 % of things; paper's rule 89 %", "scenarios", "| all | 226 | 0.58 | 0.44 | 0.89 | 0.99"),
+        ("92 % of 1500", "baseline", "**all 1500** | **96.0** | **92.1**"),
+        ("18 of 75; servo 73 of 75", "ladder", "one grasp | 28 | 18 |"),
+        ("18 of 75; servo 73 of 75", "ladder", "a second try | 73 | 73 |"),
+    ],
+)
+def test_numbers_of_the_readme_are_those_of_the_page_they_come_from(in_readme, page, in_page):
+    text = (ROOT / "docs" / "results" / f"{page}.md").read_text()
+    assert in_page in " ".join(text.split()), (
+        f"the page has other numbers now: change them in README.md, too ({in_readme})"
+    )
+    assert in_readme in (ROOT / "README.md").read_text()
+
+
 @pytest.mark.sim
 @pytest.mark.parametrize("page", ["README.md", "docs/start.md"])
 def test_the_ten_lines_of_a_page_lift_the_target(page, capsys):
