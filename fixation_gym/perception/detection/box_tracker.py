@@ -29,6 +29,8 @@ class BoxTrackerSettings:
     """What lies within this share of the box around it is compared with what it holds."""
     confusion: float = 0.2
     """If more pixels than this share are on the wrong side by their colours, the box is followed as a flat pattern."""
+    stills_s: float = 0.2
+    """Images farther apart than this are stills, in which a flat pattern is found more surely than colours, s."""
     shape: ShapeSettings = field(default_factory=ShapeSettings)
     """Of what its colours tell from its surroundings."""
 
@@ -45,6 +47,7 @@ class BoxTracker:
     def reset(self) -> None:
         """Forget what the target looks like."""
         self._known: ColouredShape | FlatPatch | None = None
+        self._pattern: FlatPatch | None = None  # for stills, until it is found in one
 
     def detect(self, observation: Observation, expected: Expectation) -> MaskArray | Sighting:
         """Pixels of the target, shape (H, W); none while it is lost.
@@ -57,13 +60,24 @@ class BoxTracker:
         if self._known is None:
             box = checked_box(observation.target_box, self._full)
             mask = cut_out(observation.rgb, box, self._settings.surroundings)
+            self._time = observation.time
             if confusion(picture.rgb, self._resized(mask)) < self._settings.confusion:
                 self._known = first_shape(picture, self._resized(mask), self._settings.shape)
+                self._pattern = first_patch(picture, self._resized(mask))
             else:
                 mask = box_filled(shape, box)
                 self._known = first_patch(picture, self._resized(mask))
             return mask
-        self._known, found = self._known.followed(picture, expected)
+        stills = observation.time - self._time > self._settings.stills_s
+        self._time = observation.time
+        if self._pattern is not None and stills and isinstance(self._pattern.followed(picture)[1], Sighting):
+            self._known, self._pattern = self._pattern, None
+        if not stills:
+            self._pattern = None
+        if isinstance(self._known, FlatPatch):
+            self._known, found = self._known.followed(picture)
+        else:
+            self._known, found = self._known.followed(picture, expected)
         if isinstance(found, Sighting):
             return replace(found, mask=_enlarged(found.mask, shape))
         return _enlarged(found, shape)

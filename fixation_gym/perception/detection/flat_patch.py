@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 from fixation_gym.geometry.rigid import inverse
 from fixation_gym.perception.detection.detector import Sighting
 from fixation_gym.perception.detection.picture import Picture
-from fixation_gym.perception.detection.tracking import Expectation
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
-_SIDE = 48
+_SIDE = 64
 """Longer side of the patch that is compared, px ..."""
-_MARGIN = 0.2
+_MARGIN = 0.3
 """... with this share of the target around it, which tells where a pattern that repeats itself ends."""
 _INVERSE_DEPTHS = np.geomspace(0.3, 8.0, 60)
 """Distances that are tried, 1/m."""
@@ -40,6 +39,8 @@ _LEAST_BASELINE = 0.02
 """The plane is taken from views that are this far apart, as a share of its distance."""
 _POINT_STD_PX = 0.3
 """Noise of a place that a refined homography gives, px."""
+_POSE_PX = 6.0
+"""A pose may be wrong by so many px at 320 columns; a repeated pattern found one period beside is farther off."""
 _STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-3)
 
 Homography = NDArray[np.float64]
@@ -66,7 +67,7 @@ class FlatPatch:
     baseline: float = 0.0
     """Share of its distance by which the views were apart from which the plane was taken."""
 
-    def followed(self, picture: Picture, expected: Expectation) -> tuple[FlatPatch, Sighting | MaskArray]:
+    def followed(self, picture: Picture) -> tuple[FlatPatch, Sighting | MaskArray]:
         """What is known of it after an image, and its pixels, shape (h, w); none where it is not seen.
 
         Where it is expected is not asked: the plane and the pose of the camera say that better.
@@ -100,7 +101,7 @@ class FlatPatch:
                 continue
             used.append(rho)
             correlation, refined = self._refined(grey, tried[k][1])
-            if correlation > best:
+            if correlation > best and self._explained(picture, refined):
                 best, homography = correlation, refined
         return homography
 
@@ -139,6 +140,14 @@ class FlatPatch:
         except cv2.error:  # it did not converge
             return -1.0, homography
         return self._compared(grey, homography @ self.to_first @ left @ np.linalg.inv(self.to_first))
+
+    def _explained(self, picture: Picture, homography: Homography) -> bool:
+        """Whether some plane explains where a homography puts the thing, but for errors of the pose."""
+        plane, _ = self._plane(picture, homography)
+        corners = self.to_first @ _corners(self.patch.shape)
+        by_plane, seen = (H @ corners for H in (self._moved(picture, plane), homography))
+        off = np.linalg.norm(by_plane[:2] / by_plane[2] - seen[:2] / seen[2], axis=0)
+        return bool(np.max(off) < _POSE_PX * picture.camera.width / 320)
 
     def _plane(self, picture: Picture, homography: Homography) -> tuple[FloatArray, float]:
         """The plane that explains a homography best, and how far apart the views were, as a share of its distance."""
