@@ -97,7 +97,8 @@ def draw_pool(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> Pool 
     quota, hands = _quota(goal), hand_axes(goal.ways)
     if len(drafts.kinds) == 0 or not could_bar(goal.room.ends[-1], hands, drafts, _smaller_hand(), quota):
         return None
-    return _pool(drafts, barred_ways(goal.room.ends[-1], hands, drafts, _smaller_hand()), quota)
+    barred = barred_ways(goal.room.ends[-1], hands, drafts, _smaller_hand())
+    return _pool(drafts, barred, quota, scenario.several_mirrors)
 
 
 def with_some_across(scenario: Scenario, goal: Goal, view: View, pool: Pool, rng: np.random.Generator) -> Pool:
@@ -107,12 +108,15 @@ def with_some_across(scenario: Scenario, goal: Goal, view: View, pool: Pool, rng
     through = np.flatnonzero(pass_through(drafts, view.camera, goal.room.ends[0]))
     across = chosen_drafts(drafts, through[:_FIRST_CANDIDATES])
     barred = barred_ways(goal.room.ends[-1], hand_axes(goal.ways), across, _smaller_hand())
-    return _pool(joined_drafts(across, pool.drafts), np.concatenate([barred, pool.barred]), pool.quota)
+    barred = np.concatenate([barred, pool.barred])
+    return _pool(joined_drafts(across, pool.drafts), barred, pool.quota, scenario.several_mirrors)
 
 
-def _pool(drafts: Drafts, barred: MaskArray, quota: Quota) -> Pool:
+def _pool(drafts: Drafts, barred: MaskArray, quota: Quota, several_mirrors: bool) -> Pool:
     clashes, mirrors = pairs_that_meet(drafts.boxes, drafts.ends, _OBSTACLE_GAP), drafts.materials == _MIRROR
-    return Pool(drafts, barred, clashes | np.outer(mirrors, mirrors), quota)  # MuJoCo draws one reflection only
+    if not several_mirrors:  # MuJoCo draws one reflection only
+        clashes |= np.outer(mirrors, mirrors)
+    return Pool(drafts, barred, clashes, quota)
 
 
 def _aim(goal: Goal) -> Aim:

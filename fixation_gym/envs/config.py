@@ -8,7 +8,7 @@ from typing import Any
 
 from fixation_gym.envs.object_pool import MAX_OBSTACLES, TARGET_SHAPES
 from fixation_gym.envs.obstacle_kinds import KIND_NAMES
-from fixation_gym.envs.shapes import MATERIALS
+from fixation_gym.envs.shapes import MATERIALS, PLAIN_MATERIALS
 from fixation_gym.robots import ROBOT
 
 CONTROL_FREQUENCY = 25
@@ -81,6 +81,8 @@ class Scenario:
     coloured_frames: bool = False
     """Whether frames and rims are of colours drawn for each obstacle, instead of one dark grey. Nothing else of a
     scene differs."""
+    several_mirrors: bool = False
+    """Whether there may be more than one framed mirror; MuJoCo shows the reflection in one of them only."""
     any_colour: bool = False
     """Whether target, distractor and obstacles are of any colour and texture; the box in the first image tells which
     thing is the target. Nothing else of a scene differs."""
@@ -106,7 +108,7 @@ class Scenario:
         _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
         _require_probability("target_moves", self.target_moves)
         _require_probability("distractor", self.distractor)
-        for name in ("through_sight", "discovery", "coloured_frames", "any_colour"):
+        for name in ("through_sight", "discovery", "coloured_frames", "any_colour", "several_mirrors"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"{name} must be true or false, got {getattr(self, name)!r}")
         self._check_obstacles()
@@ -126,8 +128,11 @@ class Scenario:
             raise ValueError(f"obstacle_count {still} needs obstacle_materials and obstacle_kinds to draw from")
         if moving[1] and not self.obstacle_motions:
             raise ValueError(f"moving_count {moving} needs obstacle_motions from {list(OBSTACLE_MOTIONS)}")
-        if set(self.obstacle_materials) == {"mirror"} and still[1] + moving[1] > 1:
-            raise ValueError("obstacle_materials of mirrors alone allow one obstacle; add another material")
+        alone = set(self.obstacle_materials) == {"mirror"} and (moving[1] > 0 or not self.several_mirrors)
+        if alone and still[1] + moving[1] > 1:
+            raise ValueError(
+                "obstacle_materials of mirrors alone allow one obstacle; add another material, or several_mirrors"
+            )
 
 
 def _require_names(field: str, names: tuple[str, ...], allowed: tuple[str, ...]) -> None:
@@ -191,7 +196,7 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario("distractor", distractor=1.0),
         Scenario(
             "mixed",
-            MATERIALS,
+            PLAIN_MATERIALS,
             obstacle_count=(2, 6),
             moving_count=(0, 1),
             target_moves=0.3,
@@ -214,7 +219,7 @@ SCENARIOS: dict[str, Scenario] = {
             free_elevation_deg=_reached(42.0, 80.0),
             free_azimuth_shape=(1.25, 1.0),
         ),
-        Scenario("clutter", MATERIALS, obstacle_count=(5, 9)),
+        Scenario("clutter", PLAIN_MATERIALS, obstacle_count=(5, 9)),
         Scenario(
             "any_colour", ("opaque", "translucent", "wire"), obstacle_count=(2, 6), distractor=0.5, any_colour=True
         ),
@@ -224,6 +229,25 @@ SCENARIOS: dict[str, Scenario] = {
             first_kinds=("wall", "thing"),
             obstacle_count=(2, 6),
             discovery=True,
+        ),
+        Scenario("glass", ("glass",), first_kinds=("thing",), obstacle_count=(2, 6)),
+        Scenario("chrome", ("chrome",), first_kinds=("thing",), obstacle_count=(2, 6)),
+        Scenario("two_mirrors", ("mirror",), obstacle_count=(2, 6), several_mirrors=True),
+        Scenario(
+            "window",
+            ("translucent", "glass"),
+            first_kinds=("cabinet", "niche"),
+            obstacle_count=(1, 5),
+            free_elevation_deg=_reached(40.0, 70.0),
+        ),
+        Scenario(
+            "photoreal_mixed",
+            ("glass", "chrome", "lacquer", "plastic", "mirror", "opaque", "wire"),
+            obstacle_count=(2, 6),
+            moving_count=(0, 1),
+            target_moves=0.3,
+            distractor=0.3,
+            several_mirrors=True,
         ),
     )
 }

@@ -21,9 +21,20 @@ YAW, PITCH, PRIMITIVE, FINISH, DENSITY = range(6, 11)
 COLUMNS = 11
 MOST_PARTS = max(SLOTS)
 """Largest number of parts of an obstacle."""
-OPAQUE, TRANSLUCENT, MIRROR, WIRE = (MATERIALS.index(name) for name in ("opaque", "translucent", "mirror", "wire"))
+OPAQUE, TRANSLUCENT, MIRROR, WIRE, PLATE_GLASS, CHROME, LACQUER, PLASTIC = range(len(MATERIALS))
 BOX, CYLINDER = PRIMITIVES.index("box"), PRIMITIVES.index("cylinder")
 SOLID, GLASS, RIM, LABEL, MIRRORING = (FINISHES.index(name) for name in ("solid", "glass", "rim", "label", "mirror"))
+_BOARDS = {
+    OPAQUE: (0.006, SOLID),
+    PLATE_GLASS: (0.005, GLASS),
+    CHROME: (0.004, FINISHES.index("brushed")),
+    LACQUER: (0.006, FINISHES.index("lacquer")),
+    PLASTIC: (0.003, FINISHES.index("plastic")),
+}
+_FRAMELESS = np.array([material in _BOARDS for material in range(len(MATERIALS))])
+_THICKNESSES = np.array([_BOARDS.get(material, (0.0, 0))[0] for material in range(len(MATERIALS))])
+"""Half thickness of boards without a frame, by material, m."""
+_BOARD_FINISHES = np.array([_BOARDS.get(material, (0.0, 0))[1] for material in range(len(MATERIALS))])
 _RIM_WIDTH = 0.005
 """Half width of the rims of panes, m."""
 _FOOT_DENSITY = 8.0
@@ -87,7 +98,7 @@ def write_pane(
     Args:
         rows: to write into.
         count: of rows that are filled.
-        material: ``OPAQUE`` (a board), ``TRANSLUCENT`` (glass with a rim), ``MIRROR`` (with a rim) or ``WIRE``.
+        material: ``TRANSLUCENT`` (glass with a rim), ``MIRROR`` (with a rim), ``WIRE``, or one without a frame.
         half_width: along y, m.
         half_height: along the board's own z, m.
         x: of its centre, m.
@@ -96,8 +107,10 @@ def write_pane(
         pitch: rad; -pi/2 makes a horizontal board that faces up.
     """
     centre = (x, y, z)
-    if material == OPAQUE:
-        return put(rows, count, centre, (0.006, half_width, half_height), pitch, SOLID)
+    if _FRAMELESS[material]:
+        return put(
+            rows, count, centre, (_THICKNESSES[material], half_width, half_height), pitch, _BOARD_FINISHES[material]
+        )
     inner_width, inner_height = half_width - 2 * _RIM_WIDTH, half_height - 2 * _RIM_WIDTH
     if material == MIRROR:
         # MuJoCo draws the reflection on a box's local +z face; a quarter turn takes it to the board's +x.

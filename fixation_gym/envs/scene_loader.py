@@ -16,6 +16,7 @@ from fixation_gym.envs.object_pool import SLOTS, TARGET_SHAPES, target_shape
 from fixation_gym.envs.pool_slots import slots_for
 from fixation_gym.envs.scene import UNTINTED, ObstacleSpec, SceneSpec, TargetSpec
 from fixation_gym.envs.scene_mjcf import (
+    FINISH_MATERIALS,
     MIRROR_MATERIAL,
     RED_BODIES,
     VISIBLE_GROUP,
@@ -28,6 +29,8 @@ from fixation_gym.envs.shapes import Part, Shape
 from fixation_gym.types import FloatArray, Vector
 
 _LABEL_RGBA = (0.85, 0.85, 0.25, 1.0)
+_UNSET = (0.5, 0.5, 0.5, 1.0)
+"""Colour of a geom that takes its material's."""
 
 _WRITTEN_FIELDS = (
     *("geom_type", "geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb", "geom_group", "geom_contype"),
@@ -113,8 +116,12 @@ class SceneLoader:
 
     def _load_obstacle(self, slot: str, obstacle: ObstacleSpec) -> None:
         model = self._model
-        colours = {"glass": obstacle.rgba, "rim": obstacle.frame_rgba, "label": _LABEL_RGBA}
-        materials = {"solid": obstacle.texture, "mirror": MIRROR_MATERIAL}
+        clear, paint = obstacle.rgba, (*obstacle.rgba[:3], 1.0)
+        colours = {"solid": obstacle.tint, "rim": obstacle.frame_rgba, "label": _LABEL_RGBA, "lacquer": paint}
+        colours |= dict.fromkeys(("glass", "cup", "water", "plastic"), clear) | dict.fromkeys(
+            ("chrome", "brushed"), _UNSET
+        )
+        materials = {"solid": obstacle.texture, "mirror": MIRROR_MATERIAL} | {name: name for name in FINISH_MATERIALS}
         for geom, part in zip(self._slots[slot], obstacle.shape.parts, strict=False):
             model.geom_type[geom] = self._types[part.primitive]
             model.geom_quat[geom] = quaternion(part)
@@ -123,7 +130,7 @@ class SceneLoader:
             self._show(geom, part, size, np.array(part.pos))
             material = materials.get(part.finish)
             model.geom_matid[geom] = -1 if material is None else self._materials[material]
-            model.geom_rgba[geom] = colours.get(part.finish, obstacle.tint if part.finish == "solid" else UNTINTED)
+            model.geom_rgba[geom] = colours.get(part.finish, UNTINTED)
         self._weigh(slot, obstacle.shape, np.ones(3))
 
     def _show(self, geom: int, part: Part, size: FloatArray, position: FloatArray) -> None:

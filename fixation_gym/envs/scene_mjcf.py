@@ -34,6 +34,15 @@ TEXTURES = {
 }
 _FLAT = ("table", "poster")
 MIRROR_MATERIAL = "mirror_glass"
+FINISH_MATERIALS = {
+    "cup": {"specular": "0.8", "shininess": "0.8"},
+    "water": {"specular": "0.8", "shininess": "0.8"},
+    "chrome": {"rgba": "0.62 0.63 0.65 1", "specular": "1", "shininess": "0.9"},
+    "brushed": {"rgba": "0.66 0.66 0.66 1", "specular": "0.7", "shininess": "0.3"},
+    "lacquer": {"specular": "1", "shininess": "0.9"},
+    "plastic": {"specular": "0.3", "shininess": "0.3"},
+}
+"""Looks of finishes of the same names, which are right in physically based pictures only; a scene has their colours."""
 
 
 def add_materials(asset: ET.Element, texture_path: Callable[[str], str]) -> None:
@@ -51,6 +60,8 @@ def add_materials(asset: ET.Element, texture_path: Callable[[str], str]) -> None
             if name.startswith("table"):
                 attributes["rgba"] = "0.7 0.7 0.7 1"  # a white table saturates the image
         ET.SubElement(asset, "material", attributes)
+    for name, attributes in FINISH_MATERIALS.items():
+        ET.SubElement(asset, "material", {"name": name, "reflectance": "0", **attributes})
     mirror = {"name": MIRROR_MATERIAL, "rgba": "0.25 0.27 0.28 1", "reflectance": "0.85", "specular": "0.6"}
     ET.SubElement(asset, "material", mirror)
 

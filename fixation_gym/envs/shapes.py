@@ -15,11 +15,16 @@ from fixation_gym.geometry.boxes import BoxSet, rotations
 from fixation_gym.types import FloatArray, Vector
 
 Primitive = Literal["box", "cylinder", "sphere", "ellipsoid"]
-Finish = Literal["solid", "glass", "rim", "label", "mirror"]
+Finish = Literal["solid", "glass", "rim", "label", "mirror", "cup", "water", "chrome", "brushed", "lacquer", "plastic"]
 PRIMITIVES: tuple[Primitive, ...] = get_args(Primitive)
 FINISHES: tuple[Finish, ...] = get_args(Finish)
-MATERIALS = ("opaque", "translucent", "mirror", "wire")
-"""What obstacles are made of: wood, bricks or metal; glass with rims; one framed mirror; bars."""
+SEE_THROUGH = ("glass", "cup")
+"""Finishes through which the target may be seen; what is behind a bottle of water or thin plastic is not known."""
+PLAIN_MATERIALS = ("opaque", "translucent", "mirror", "wire")
+"""What obstacles are made of: wood, bricks or metal; glass with rims; a framed mirror; bars."""
+MATERIALS = (*PLAIN_MATERIALS, "glass", "chrome", "lacquer", "plastic")
+"""Also: thick glass without rims; polished and brushed metal; glossy paint; thin, cloudy plastic. Their pictures are
+right in ``renderer="mitsuba"`` only."""
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,50 @@ THINGS: dict[str, tuple[Shape, ...]] = {
         Shape("panel", _framed("translucent", 0.075, 0.090), (0.035, 0.075, 0.090), 0.6),
     ),
     "mirror": (Shape("mirror", _framed("mirror", 0.075, 0.100), (0.035, 0.075, 0.100), 0.7),),
+    "glass": (
+        Shape("tumbler", (Part("cylinder", (0.040, 0.040, 0.060), finish="cup"),), (0.040, 0.040, 0.060), 0.4),
+        Shape(
+            "water_bottle",
+            (
+                Part("cylinder", (0.036, 0.036, 0.075), (0.0, 0.0, -0.030), finish="water"),
+                Part("cylinder", (0.013, 0.013, 0.025), (0.0, 0.0, 0.070), finish="glass"),
+                Part("cylinder", (0.015, 0.015, 0.008), (0.0, 0.0, 0.097), finish="rim"),
+            ),
+            (0.036, 0.036, 0.105),
+            0.7,
+        ),
+        Shape(
+            "ball",
+            (
+                Part("sphere", (0.045, 0.045, 0.045), (0.0, 0.0, 0.013), finish="glass"),
+                Part("cylinder", (0.030, 0.030, 0.015), (0.0, 0.0, -0.043), finish="rim"),
+            ),
+            (0.045, 0.045, 0.058),
+            0.6,
+        ),
+        Shape("slab", (Part("box", (0.015, 0.060, 0.090), finish="glass"),), (0.015, 0.060, 0.090), 0.8),
+    ),
+    "chrome": (
+        Shape("chrome_post", (Part("cylinder", (0.030, 0.030, 0.110), finish="chrome"),), (0.030, 0.030, 0.110), 0.8),
+        Shape("brushed_post", (Part("cylinder", (0.035, 0.035, 0.090), finish="brushed"),), (0.035, 0.035, 0.090), 0.8),
+        Shape(
+            "chrome_ball",
+            (
+                Part("sphere", (0.045, 0.045, 0.045), (0.0, 0.0, 0.013), finish="chrome"),
+                Part("cylinder", (0.030, 0.030, 0.015), (0.0, 0.0, -0.043), finish="rim"),
+            ),
+            (0.045, 0.045, 0.058),
+            0.6,
+        ),
+    ),
+    "lacquer": (
+        Shape("block", (Part("box", (0.030, 0.045, 0.090), finish="lacquer"),), (0.030, 0.045, 0.090), 0.6),
+        Shape("post", (Part("cylinder", (0.030, 0.030, 0.100), finish="lacquer"),), (0.030, 0.030, 0.100), 0.6),
+    ),
+    "plastic": (
+        Shape("can", (Part("cylinder", (0.035, 0.035, 0.085), finish="plastic"),), (0.035, 0.035, 0.085), 0.4),
+        Shape("case", (Part("box", (0.030, 0.050, 0.080), finish="plastic"),), (0.030, 0.050, 0.080), 0.4),
+    ),
     "wire": (Shape("cage", cage(0.055, 0.065, 0.090, 0.003), (0.055, 0.065, 0.090), 0.5),),
 }
 """Things of each material that stand on the table, at scale 1."""

@@ -72,7 +72,7 @@ class TruthView:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
         visible = model.geom_group == scene_mjcf.VISIBLE_GROUP
-        glass = np.flatnonzero(visible & (model.geom_rgba[:, 3] < 1.0) & (model.geom_matid < 0))
+        glass = np.flatnonzero(visible & (model.geom_rgba[:, 3] < 1.0))
         geom = self._segment()
         depth = self._depth()
         behind = depth

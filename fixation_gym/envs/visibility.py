@@ -11,6 +11,7 @@ from fixation_gym.envs.drafts import Drafts
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.part_rows import PITCH, YAW
 from fixation_gym.envs.scene import ObstacleSpec, TargetSpec
+from fixation_gym.envs.shapes import SEE_THROUGH
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
@@ -86,7 +87,7 @@ def _hidden(camera: FloatArray, points: FloatArray, obstacles: list[ObstacleSpec
     for obstacle in obstacles:
         boxes = obstacle.shape.boxes(obstacle.position, obstacle.yaw)
         for part, centre, rotation, half in zip(obstacle.shape.parts, *boxes, strict=True):
-            if part.finish != "glass" or obstacle.rgba[3] > _CLEAR:
+            if part.finish not in SEE_THROUGH or obstacle.rgba[3] > _CLEAR:
                 hidden |= _crossed(camera, points, centre, rotation, half)
     return hidden
 

@@ -22,6 +22,10 @@ _BOX_COLOURS = {
     "translucent": "#7fb8c9",
     "mirror": "#9aa5b1",
     "wire": "#b0b0b0",
+    "glass": "#9fd3c7",
+    "chrome": "#7d8792",
+    "lacquer": "#b58bc0",
+    "plastic": "#cfc9a5",
 }
 _MOVED_M = 0.005
 """Of a box that ends so far from where it stood, the way is drawn; and the box, too, unless it toppled. m."""

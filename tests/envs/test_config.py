@@ -17,7 +17,7 @@ def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
 @pytest.mark.parametrize(
     ("scenario", "message"),
     [
-        ("glass", "clear, opaque, translucent, mirror"),
+        ("granite", "clear, opaque, translucent, mirror"),
         ({"obstacles": 3}, "obstacle_count"),
         ({"obstacle_count": [0, 10], "obstacle_materials": ["opaque"]}, "within 0..9"),
         ({"obstacle_count": [1, 1]}, "obstacle_materials"),

@@ -41,6 +41,7 @@ def test_llvm_is_chosen_where_it_works_and_asked_once(monkeypatch):
 
 def test_scalar_variant_is_taken_without_an_llvm_library(monkeypatch, tmp_path):
     pytest.importorskip("mitsuba")
+    pytest.importorskip("pyoidn")
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM.so"))
     assert "libllvm19" in engine.why_no_llvm()
     assert engine.choose_variant() == engine.SCALAR

@@ -9,6 +9,7 @@ from fixation_gym.evaluation.config import EvaluationConfig
 
 pytestmark = pytest.mark.sim
 pytest.importorskip("mitsuba")
+pytest.importorskip("pyoidn")
 SIZE = (48, 64)
 ACTION = np.array([0.3, 0.1, 0.4, 0.0, 0.1, 0.0, 0.0], np.float32)
 

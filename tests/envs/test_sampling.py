@@ -16,7 +16,7 @@ from fixation_gym.envs.goal import Way
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.sampling import sample_scene
-from fixation_gym.envs.shapes import MATERIALS
+from fixation_gym.envs.shapes import PLAIN_MATERIALS
 from fixation_gym.envs.visibility import visible_share
 from fixation_gym.geometry.boxes import box_set, joined
 from fixation_gym.geometry.rigid import look_at
@@ -199,7 +199,7 @@ def test_the_target_is_the_red_object_nearer_to_the_first_image_centre():
 def test_mixed_draws_from_everything_and_survives_json():
     drawn = scenes("mixed", 16)
     obstacles = [obstacle for scene in drawn for obstacle in scene.obstacles]
-    assert {obstacle.kind for obstacle in obstacles} == set(MATERIALS)
+    assert {obstacle.kind for obstacle in obstacles} == set(PLAIN_MATERIALS)
     motions = [obstacle.motion for obstacle in obstacles]
     assert {motion if motion is None else motion.to_and_fro for motion in motions} == {None, True, False}
     assert {scene.distractor is None for scene in drawn} == {True, False}

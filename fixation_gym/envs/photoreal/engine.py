@@ -42,8 +42,8 @@ class MissingMitsubaError(UsageError):
 
 
 def is_installed() -> bool:
-    """Whether Mitsuba can be imported."""
-    return importlib.util.find_spec("mitsuba") is not None
+    """Whether Mitsuba and its denoiser can be imported."""
+    return all(importlib.util.find_spec(name) is not None for name in ("mitsuba", "pyoidn"))
 
 
 def check_renderer(name: str) -> None:
@@ -129,3 +129,13 @@ def load() -> Any:
     if mitsuba.variant() != variant:
         mitsuba.set_variant(variant)
     return mitsuba
+
+
+def load_denoiser() -> Any:
+    """The module ``pyoidn``: Intel's Open Image Denoise, which gives equal pictures for equal ones.
+
+    Raises:
+        MissingMitsubaError: if it is not installed.
+    """
+    require()
+    return importlib.import_module("pyoidn")

@@ -11,9 +11,9 @@ from fixation_gym.types import FloatArray
 _SKY, _SKY_WEIGHT = 0.4, 0.1
 """Radiance of the sky, in units in which a white sheet that gets pi shows as white, and how often light is looked for
 there: nearly all comes from the panel."""
-_PANEL = 4.2
+_PANEL = 2.6
 """Radiance of the panel in these units."""
-_HALF_SIZE, _DISTANCE = 0.8, 1.7
+_HALF_SIZE, _DISTANCE = 1.2, 1.7
 """Half of a side of the panel and its distance from the middle of the table, m. It is large, because light that has
 passed through glass is found by chance only: a small one would leave bright specks."""
 

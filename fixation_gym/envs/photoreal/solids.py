@@ -3,13 +3,13 @@
 """What a compiled model shows, as triangles and materials: all geoms that the wrist camera may see.
 
 The model says all of it: a scene's things are in its geoms (``scene_loader.py``). What is see-through there is of real
-glass here: boxes are solid, upright cylinders are vessels with a wall, balls are solid.
+glass here: boxes are solid, cylinders are vessels with a wall, balls are solid.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -17,7 +17,7 @@ import numpy as np
 
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.envs.photoreal import meshes
-from fixation_gym.envs.photoreal.materials import Material, linear
+from fixation_gym.envs.photoreal.materials import WATER, Finish, Material, linear
 from fixation_gym.envs.photoreal.meshes import Mesh
 from fixation_gym.types import FloatArray
 
@@ -26,7 +26,20 @@ _UNSET = (0.5, 0.5, 0.5, 1.0)
 """Colour of a geom that takes its material's."""
 _WALL, _FLOOR = 0.0025, 0.006
 """Thickness of the wall and of the bottom of vessels, m."""
-_NO_UV = 1e-6
+_LEVEL = 0.7
+"""How full bottles of water are."""
+_NO_AREA = 1e-12
+_CLEAR = (1.0, 1.0, 1.0)
+_FINISHES: dict[str, Finish] = {
+    scene_mjcf.MIRROR_MATERIAL: "mirror",
+    "cup": "glass",
+    "water": "glass",
+    "chrome": "chrome",
+    "brushed": "brushed",
+    "lacquer": "lacquer",
+    "plastic": "plastic",
+}
+"""Finishes of the model's materials; the others are matt and may be textured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +67,13 @@ def solids_of(model: Any) -> list[Solid]:
 
 def _pieces(model: Any, geom: int) -> Iterator[tuple[Mesh, Material]]:
     """Surfaces of one geom in its own frame."""
-    material = _material(model, geom)
+    material, name = _material(model, geom), _material_name(model, geom)
     size, kind = model.geom_size[geom], mujoco.mjtGeom(model.geom_type[geom])
     if material.finish == "mirror":  # the simulator reflects on a box's +z face only
         yield meshes.box(size, meshes.TOP), material
         yield meshes.box(size, meshes.OTHERS), Material("matt", material.rgb)
     elif material.finish == "glass" and kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        yield _vessel(size[0], size[1]), material
+        yield from vessel(size[0], size[1], material, is_open=name == "cup", level=_LEVEL if name == "water" else 0.0)
     else:
         yield _surface(model, geom, kind, size), material
 
@@ -94,11 +107,36 @@ def _with_repeats(mesh: Mesh, model: Any, geom: int, size: FloatArray) -> Mesh:
     return Mesh(mesh.vertices, mesh.faces, mesh.uv * repeats, mesh.normals)
 
 
-def _vessel(radius: float, half_height: float) -> Mesh:
-    """A closed vessel of glass: outer surface, and the surface towards the air inside."""
+def vessel(
+    radius: float, half_height: float, glass: Material, *, is_open: bool, level: float
+) -> list[tuple[Mesh, Material]]:
+    """Surfaces of an upright vessel: to the air around it, to the air in it, and around the water in it.
+
+    Args:
+        radius: of the outer wall, m.
+        half_height: m.
+        glass: what it is made of.
+        is_open: at the top, or closed there.
+        level: how full of water it is, 0..1.
+    """
     inner, bottom, top = radius - _WALL, _FLOOR - half_height, half_height - _WALL
-    inside = meshes.vessel_of(((0.0, bottom), (inner, bottom), (inner, top), (0.0, top)))
-    return meshes.joined([meshes.cylinder(radius, half_height), inside.turned_inside_out()])
+    water = bottom + level * (top - bottom)
+    outer = [(0.0, -half_height), (radius, -half_height), (radius, half_height)]
+    dry = [(inner, water), (inner, half_height if is_open else top)]
+    if is_open:
+        outer.append((inner, half_height))
+    else:
+        outer.append((0.0, half_height))
+        dry.append((0.0, top))
+    wet = [(0.0, bottom), (inner, bottom), (inner, water)]
+    if not level:
+        dry = [*wet[:2], *dry[1:]]
+    pieces = [(meshes.joined([meshes.vessel_of(outer), meshes.vessel_of(dry).turned_inside_out()]), glass)]
+    if level:
+        # Normals of the glass point into the water, those of the water's top into the air.
+        pieces.append((meshes.vessel_of(wet).turned_inside_out(), replace(glass, outside=WATER)))
+        pieces.append((meshes.vessel_of([(inner, water), (0.0, water)]), replace(glass, rgb=_CLEAR, inside=WATER)))
+    return pieces
 
 
 def _from_file(model: Any, index: int) -> Mesh:
@@ -107,7 +145,7 @@ def _from_file(model: Any, index: int) -> Mesh:
     corners = model.mesh_face[model.mesh_faceadr[index] :][: model.mesh_facenum[index]]
     triangles = model.mesh_vert[start : start + count][corners].astype(float)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _NO_UV)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _NO_AREA)
     vertices = triangles.reshape(-1, 3)
     faces = np.arange(len(vertices)).reshape(-1, 3)
     return Mesh(vertices, faces, np.zeros((len(vertices), 2)), np.repeat(normals, 3, axis=0))
@@ -117,14 +155,20 @@ def _material(model: Any, geom: int) -> Material:
     rgba, index = model.geom_rgba[geom], model.geom_matid[geom]
     if index < 0:
         return Material("glass" if rgba[3] < 1.0 else "gloss", _rgb(rgba))
-    if model.mat(index).name == scene_mjcf.MIRROR_MATERIAL:
-        return Material("mirror", _rgb(model.mat_rgba[index]))
-    texture = int(model.mat_texid[index, mujoco.mjtTextureRole.mjTEXROLE_RGB])
-    return Material("matt", _rgb(model.mat_rgba[index] if np.allclose(rgba, _UNSET) else rgba), texture)
+    rgb = _rgb(model.mat_rgba[index] if np.allclose(rgba, _UNSET) else rgba)
+    finish = _FINISHES.get(_material_name(model, geom))
+    if finish is not None:
+        return Material(finish, rgb)
+    return Material("matt", rgb, int(model.mat_texid[index, mujoco.mjtTextureRole.mjTEXROLE_RGB]))
+
+
+def _material_name(model: Any, geom: int) -> str:
+    index = model.geom_matid[geom]
+    return "" if index < 0 else model.mat(index).name
 
 
 def _rgb(rgba: FloatArray) -> tuple[float, float, float]:
-    red, green, blue = (float(value) for value in np.round(rgba[:3], 6))
+    red, green, blue = (round(float(value), 6) for value in rgba[:3])
     return red, green, blue
 
 
