@@ -27,7 +27,7 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
     t = np.float32(0.5) * filtered(change, prefilter, prefilter)
     motion, temporal, own = noise
     weight = 1 / (motion / 16 * (x * x + y * y) + temporal / 16)
-    products = (x * x - own, x * y, y * y - own, x * t, y * t, x, y, t, np.float32(1))
+    products = (x * x - own, x * y, y * y - own, x * t, y * t, x, y, t, np.float32(1), t * t)
     for plane, product in zip(pooled, products, strict=True):
         plane[:] = cv2.resize(weight * product, plane.shape[::-1], interpolation=cv2.INTER_AREA)
 
@@ -39,9 +39,10 @@ def window_sums(planes, sums):
 
 
 def centred_sums(windows, least, sums):
-    x, y, t, weight = windows[5:]
+    x, y, t, weight, squares = windows[5:]
     for plane, (one, other) in enumerate(((x, x), (x, y), (y, y), (x, t), (y, t))):
         sums[plane] = windows[plane] - one * other / weight
+    sums[5] = squares - t * t / weight
     xx, xy, yy = sums[0], sums[1], sums[2]
     np.maximum(xx, least, out=xx)
     np.maximum(yy, least, out=yy)
@@ -51,7 +52,7 @@ def centred_sums(windows, least, sums):
 
 
 def solve_windows(sums, weak, cov, residual):
-    xx, xy, yy, x, y = sums
+    xx, xy, yy, x, y = sums[:5]
     prior = weak + np.float32(1e-5) * (xx + yy)
     # det(J + prior I), where the part of J that rounding may have made negative is 0.
     determinant = np.maximum(xx * yy - xy * xy, 0) + prior * (xx + yy + prior)

@@ -70,7 +70,7 @@ def test_compiled_and_plain_code_say_the_same(height, width, support, monkeypatc
 @pytest.mark.parametrize("size", [(96, 128), (97, 131), (96, 131), (97, 128), (3, 3), (2, 9)])
 def test_pixels_are_pooled_by_area_for_every_size(size):
     smooth, change = np.random.default_rng(2).normal(0, 30, (2, *size)).astype(np.float32)
-    compiled, plain = np.empty((2, 9, size[0] // 2, size[1] // 2), np.float32)
+    compiled, plain = np.empty((2, 10, size[0] // 2, size[1] // 2), np.float32)
     for way, pooled in ((kernels, compiled), (twins, plain)):
         noise = np.float32(0.0125), np.float32(3.0), np.float32(0.7)
         way.pooled_products(smooth, change, gradients.SPACE_PREFILTER, gradients.SPACE_DERIVATIVE, noise, pooled)
@@ -80,8 +80,8 @@ def test_pixels_are_pooled_by_area_for_every_size(size):
 @pytest.mark.parametrize("size", [(40, 64), (41, 65), (40, 65), (41, 64), (121, 163)])
 def test_a_coarse_level_is_enlarged_for_every_size(size):
     rng = np.random.default_rng(3)
-    coarse = rng.normal(0, 30, (5, size[0] // 2, size[1] // 2)).astype(np.float32)
-    motion, fine = rng.normal(0, 1, coarse[:2].shape).astype(np.float32), np.zeros((5, *size), np.float32)
+    coarse = rng.normal(0, 30, (6, size[0] // 2, size[1] // 2)).astype(np.float32)
+    motion, fine = rng.normal(0, 1, coarse[:2].shape).astype(np.float32), np.zeros((6, *size), np.float32)
     compiled, plain = fine.copy(), fine.copy()
     for way, sums in ((kernels, compiled), (twins, plain)):
         way.take_coarse_where_fast(coarse, motion, np.float32(1.4), gradients._TO_FINER_PX, sums)

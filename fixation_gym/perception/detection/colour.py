@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
@@ -11,30 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.detection.colour_shift import RED, Colour, colour_in_box
 from fixation_gym.perception.detection.segmentation import Segmentation, segmentation_of
 from fixation_gym.perception.detection.tracking import FIRST_LOOK, Expectation
 from fixation_gym.perception.zero_flow import pixel_kernels
 from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
-
-
-@dataclass(frozen=True, slots=True)
-class Colour:
-    """A range of hue, saturation and brightness, and how large and how scattered a target of that colour may be."""
-
-    hue_deg: float
-    """Centre of the hue range, degrees in 0..360 (0 = red)."""
-    hue_tolerance_deg: float
-    """Half width of the hue range, degrees."""
-    min_saturation: float
-    """Least saturation, 0..1. A pure red seen through a half-transparent grey object keeps about 0.55."""
-    min_value: float
-    """Least brightness, 0..1; below it hue is noise."""
-    merge_gap_fraction: float = 0.04
-    """Parts closer than this share of the image width belong to one target: a bar in front may cut it in pieces."""
-
-
-RED = Colour(hue_deg=0.0, hue_tolerance_deg=16.0, min_saturation=0.45, min_value=0.16)
-"""The colour of the target in every scenario."""
 
 
 class ColourDetector:
@@ -49,13 +29,21 @@ class ColourDetector:
             follow: False takes the target to be anywhere, like in the first image; for comparison.
         """
         self._intrinsics, self._colour, self._follow = intrinsics, colour, follow
+        self.reset()
 
     def reset(self) -> None:
-        """Nothing is kept between images."""
+        """Forget how the camera showed the colour."""
+        self._shown: Colour | None = None
 
     def detect(self, observation: Observation, expected: Expectation) -> MaskArray:
-        """Pixels of the target, shape (H, W)."""
-        return colour_mask(observation.rgb, self._intrinsics, self._colour, expected if self._follow else FIRST_LOOK)
+        """Pixels of the target, shape (H, W).
+
+        The box in the first image, if there is one, tells how this camera shows its colour.
+        """
+        if self._shown is None:
+            box = observation.target_box
+            self._shown = self._colour if box is None else colour_in_box(observation.rgb, box, self._colour)
+        return colour_mask(observation.rgb, self._intrinsics, self._shown, expected if self._follow else FIRST_LOOK)
 
 
 def colour_mask(rgb: ImageArray, intrinsics: Intrinsics, colour: Colour, expected: Expectation | None) -> MaskArray:

@@ -43,7 +43,9 @@ class FlowSettings:
     max_displacement: float = 1.8
     """Largest residual motion trusted at a level, px of its frames per frame interval."""
     image_noise_std: float = 2.0
-    """Temporal noise of the frames, grey levels (0..255)."""
+    """Temporal noise of the frames, grey levels (0..255) ..."""
+    dark_noise_std: float = 1.0
+    """... and of dark ones, which have less of it, but less contrast, too."""
     motion_noise_std: float = 0.05
     """Departure of single pixels from the window's common motion (interpolation, aliasing), px per interval."""
     noise_correlation: float = 5.0
@@ -58,7 +60,7 @@ def gradient_sums(
     levels: int,
     scratch: Scratch,
 ) -> Float32Array:
-    """Windowed sums J_xx, J_xy, J_yy, b_x, b_y on the half-size grid, shape (5, h, w), in its px.
+    """Windowed sums J_xx, J_xy, J_yy, b_x, b_y, e on the half-size grid, shape (6, h, w), in its px.
 
     Where the next coarser level sees a motion too large for this level, its sums are taken instead.
 
@@ -90,13 +92,13 @@ def gradient_sums(
 def _level_sums(
     smooth: Float32Array, change: Float32Array, noise_std: float, settings: FlowSettings, scratch: Scratch
 ) -> Float32Array:
-    """Windowed gradient products of one level, shape (5, h, w), weighted so that J is the information."""
+    """Windowed gradient products of one level, shape (6, h, w), weighted so that J is the information."""
     temporal = settings.noise_correlation * _TEMPORAL_NOISE_GAIN * noise_std**2
     # Noise alone gives gradients; their mean energy is taken out, else plain surfaces would seem to stand still.
     own = _SPATIAL_NOISE_GAIN * noise_std**2
     shape = smooth.shape[0] // 2, smooth.shape[1] // 2
-    pooled, windows = scratch.get("pooled", 9, *shape), scratch.get("windows", 9, *shape)
-    sums = np.empty((5, *shape), np.float32)
+    pooled, windows = scratch.get("pooled", 10, *shape), scratch.get("windows", 10, *shape)
+    sums = np.empty((6, *shape), np.float32)
     # What is left on a plain surface scatters by about a third of the energy taken out; no less is ever stated.
     least = np.float32(0.3 * own / temporal * 16 * kernels.WINDOW**2)
     noise = np.float32(settings.noise_correlation * settings.motion_noise_std**2), np.float32(temporal), np.float32(own)
@@ -110,7 +112,7 @@ def solve(sums: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Motion of every window and its covariance.
 
     Args:
-        sums: J_xx, J_xy, J_yy, b_x, b_y, shape (5, h, w).
+        sums: J_xx, J_xy, J_yy, b_x, b_y, shape (5 or more, h, w).
 
     Returns:
         Entries xx, xy, yy of J^-1, shape (3, h, w), and -J^-1 b, shape (2, h, w). A very weak prior keeps them finite:
@@ -125,7 +127,8 @@ _TEMPORAL_NOISE_GAIN = float((SPACE_PREFILTER**2).sum() ** 2 * (TIME_DERIVATIVE*
 """Variance of the temporal derivative of white noise of variance 1."""
 _SPATIAL_NOISE_GAIN = float((SPACE_DERIVATIVE**2).sum() * (SPACE_PREFILTER**2).sum() * (TIME_PREFILTER**2).sum())
 """Variance of a spatial derivative of white noise of variance 1."""
-_TO_FINER_PX = np.array([0.25, 0.25, 0.25, 0.5, 0.5], np.float32)
-"""Sums of a coarser level in px of the next finer grid: J falls with the square, b with the length of a pixel."""
+_TO_FINER_PX = np.array([0.25, 0.25, 0.25, 0.5, 0.5, 1.0], np.float32)
+"""Sums of a coarser level in px of the next finer grid: J falls with the square, b with the length of a pixel; e has no
+unit."""
 _WEAK = np.float32(1e-4)
 """Prior information about the residual, (px/interval)^-2: a standard deviation of 100 px."""

@@ -59,7 +59,7 @@ def _cell_weights(pixels):
 
 @compiled
 def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
-    """Means over 2 x 2 pixels: weighted products xx, xy, yy, xt, yt, weighted gradients x, y, t and the weight.
+    """Means over 2 x 2 pixels: weighted products xx, xy, yy, xt, yt, weighted gradients x, y, t, the weight, and tt.
 
     Four pixels make one of the grid, whose gradient per px is twice that of the frame: a factor 16 for J, put into the
     weight. For b it is 8, so the temporal derivative comes halved.
@@ -70,16 +70,16 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
         prefilter: 5 symmetric taps.
         derivative: 5 antisymmetric taps.
         noise: variances of motion and of the temporal derivative, energy of the spatial derivatives of noise.
-        pooled: result, shape (9, H // 2, W // 2).
+        pooled: result, shape (10, H // 2, W // 2).
     """
     height, width = smooth.shape
     model, temporal, own = noise[0] / np.float32(16), noise[1] / np.float32(16), noise[2]
     p0, p1, p2, d0, d1 = prefilter[0], prefilter[1], prefilter[2], derivative[3], derivative[4]
     lines = np.empty((3, width + 4), np.float32)
     s, y, t = lines[0], lines[1], lines[2]  # filtered along the column: smoothed, by y, by time
-    products = np.zeros((9, width), np.float32)
+    products = np.zeros((10, width), np.float32)
     xx, xy, yy, xt, yt = products[0], products[1], products[2], products[3], products[4]
-    sx, sy, st, sw = products[5], products[6], products[7], products[8]
+    sx, sy, st, sw, tt = products[5], products[6], products[7], products[8], products[9]
     row_weights, column_weights = _cell_weights(height), _cell_weights(width)
     odd = height % 2 or width % 2
     for cell in range(height // 2):
@@ -113,8 +113,9 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
                 sy[i] = keep * sy[i] + wy
                 st[i] = keep * st[i] + wt
                 sw[i] = keep * sw[i] + weight
+                tt[i] = keep * tt[i] + np.float32(0.5) * gt * wt
         last = row_weights[1 + height % 2, cell]
-        for k in range(9):
+        for k in range(10):
             out, line = pooled[k, cell], products[k]
             for i in range(width // 2):
                 first, second, third = line[2 * i], line[2 * i + 1], line[min(2 * i + 2, width - 1)]
@@ -149,12 +150,13 @@ def centred_sums(windows, least, sums):
     the smaller eigenvalue of J is raised to ``least``.
 
     Args:
-        windows: sums over windows of what ``pooled_products`` gives, shape (9, h, w).
+        windows: sums over windows of what ``pooled_products`` gives, shape (10, h, w).
         least: information, (px/interval)^-2.
-        sums: result, J_xx, J_xy, J_yy, b_x, b_y, shape (5, h, w).
+        sums: result, J_xx, J_xy, J_yy, b_x, b_y, and e, the energy of the temporal gradient, shape (6, h, w).
     """
     height, width = sums.shape[1:]
     for row in range(height):
+        wtt, energy = windows[9, row], sums[5, row]
         sx, sy, st, sw = windows[5, row], windows[6, row], windows[7, row], windows[8, row]
         xx, xy, yy, x, y = sums[0, row], sums[1, row], sums[2, row], sums[3, row], sums[4, row]
         wxx, wxy, wyy = windows[0, row], windows[1, row], windows[2, row]
@@ -167,11 +169,12 @@ def centred_sums(windows, least, sums):
             lacking = max(least - np.float32(0.5) * (a + c - spread), np.float32(0))
             xx[i], xy[i], yy[i] = a + lacking, b, c + lacking
             x[i], y[i] = wx[i] - mx * st[i], wy[i] - my * st[i]
+            energy[i] = wtt[i] - st[i] * st[i] / sw[i]
 
 
 @compiled
 def solve_windows(sums, weak, cov, residual):
-    """Invert J = sums[:3] with a weak prior into cov and solve residual = -cov b, b = sums[3:]; see ``solve``."""
+    """Invert J = sums[:3] with a weak prior into cov and solve residual = -cov b, b = sums[3:5]; see ``solve``."""
     height, width = sums.shape[1:]
     for row in range(height):
         xx, xy, yy, x, y = sums[0, row], sums[1, row], sums[2, row], sums[3, row], sums[4, row]
@@ -215,11 +218,11 @@ def take_coarse_where_fast(coarse, motion, fastest, scales, sums):
     """Replace the sums of a level by those of the next coarser one, enlarged bilinearly, where that sees fast motion.
 
     Args:
-        coarse: sums of the coarser level, shape (5, h, w).
+        coarse: sums of the coarser level, shape (6, h, w).
         motion: its motion, shape (2, h, w).
         fastest: square of the fastest motion that the finer level is trusted with, in px of the coarser.
-        scales: of the five sums, from px of the coarser level to px of the finer one.
-        sums: of the finer level, shape (5, H, W) with h = H // 2 and w = W // 2; changed in place.
+        scales: of the six sums, from px of the coarser level to px of the finer one.
+        sums: of the finer level, shape (6, H, W) with h = H // 2 and w = W // 2; changed in place.
     """
     height, width = motion.shape[1:]
     odd_row, odd_column = sums.shape[1] % 2, sums.shape[2] % 2
@@ -236,6 +239,6 @@ def take_coarse_where_fast(coarse, motion, fastest, scales, sums):
                 for j in _fine_pixels(column, odd_column):
                     x, other, near, far = columns[0, j], columns[1, j], column_shares[0, j], column_shares[1, j]
                     a, b, c, d = up * near, down * near, up * far, down * far
-                    for k in range(5):
+                    for k in range(6):
                         value = a * here[k, x] + b * there[k, x] + c * here[k, other] + d * there[k, other]
                         out[k, j] = scales[k] * value

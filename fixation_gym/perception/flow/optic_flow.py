@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
+from fixation_gym.perception.flow.brightness import is_dark, relative_gain, without_gain
 from fixation_gym.perception.flow.gradients import (
     SPACE_PREFILTER,
     TIME_DERIVATIVE,
@@ -26,6 +27,7 @@ from fixation_gym.perception.flow.gradients import (
     solve,
 )
 from fixation_gym.perception.flow.kernels import WINDOW
+from fixation_gym.perception.flow.picture_noise import take_own_noise
 from fixation_gym.perception.scratch import Float32Array, Scratch, fill
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
@@ -62,6 +64,9 @@ class Flow:
     """Maps from pixels of the middle frame to the first and to the last one, each of shape (3, 3)."""
     frame_intrinsics: Intrinsics
     """Camera of the frames."""
+    imperfect: bool = False
+    """Whether these pictures have more noise than assumed, change in brightness or are dark: then information and
+    covariances are those of the noise that was measured in them, and weak evidence is none."""
 
     @cached_property
     def flow(self) -> Float32Array:
@@ -144,10 +149,16 @@ def estimate_flow(
     """
     settings, scratch = settings or _DEFAULTS, scratch or Scratch()
     smooth, change = scratch.get("filtered in time", 2, *frames[1].shape)
-    _filter_in_time(frames, homographies, scratch, smooth, change)
-    sums = gradient_sums(smooth, change, settings.image_noise_std, settings, settings.levels, scratch)
+    seen = _warped(frames, homographies, scratch)
+    gains = relative_gain(seen[1], seen[0]), relative_gain(seen[1], seen[2])
+    _filter_in_time((without_gain(seen[0], gains[0]), seen[1], without_gain(seen[2], gains[1])), smooth, change)
+    dark = is_dark(seen[1])
+    noise = settings.dark_noise_std if dark else settings.image_noise_std
+    sums = gradient_sums(smooth, change, noise, settings, settings.levels, scratch)
     cov, residual = solve(sums)
     warp = homographies or (np.eye(3), np.eye(3))
+    overlap = _overlap(warp, intrinsics)
+    imperfect = take_own_noise(sums, cov, residual, overlap, settings, dark or gains != (1.0, 1.0))
     return Flow(
         time=times[1],
         valid=True,
@@ -156,24 +167,20 @@ def estimate_flow(
         residual=residual,
         residual_cov=cov,
         information=sums[:3],
-        gradient=sums[3:],
+        gradient=sums[3:5],
+        imperfect=imperfect,
         warp_inverse_depth=warp_inverse_depth,
-        overlap=_overlap(warp, intrinsics),
+        overlap=overlap,
         warp=warp,
         frame_intrinsics=intrinsics,
     )
 
 
-def _filter_in_time(
-    frames: Sequence[Float32Array],
-    homographies: tuple[FloatArray, FloatArray] | None,
-    scratch: Scratch,
-    smooth: Float32Array,
-    change: Float32Array,
-) -> None:
-    """Write mean and derivative over time of the frames as seen from the middle one, each of shape (H, W)."""
+def _warped(
+    frames: Sequence[Float32Array], homographies: tuple[FloatArray, FloatArray] | None, scratch: Scratch
+) -> tuple[Float32Array, Float32Array, Float32Array]:
+    """The frames as seen from the middle one, each of shape (H, W)."""
     first, middle, last = frames
-    outer, centre, slope = TIME_PREFILTER[0], TIME_PREFILTER[1], TIME_DERIVATIVE[2]
     height, width = middle.shape
     if homographies is not None:
         warped = scratch.get("warped", 2, height, width)
@@ -181,6 +188,15 @@ def _filter_in_time(
         for frame, homography, out in zip((first, last), homographies, warped, strict=True):
             cv2.warpPerspective(frame, homography, (width, height), dst=out, flags=flags, borderMode=border)
         first, last = warped
+    return first, middle, last
+
+
+def _filter_in_time(
+    frames: tuple[Float32Array, Float32Array, Float32Array], smooth: Float32Array, change: Float32Array
+) -> None:
+    """Write mean and derivative over time of frames, each of shape (H, W)."""
+    first, middle, last = frames
+    outer, centre, slope = TIME_PREFILTER[0], TIME_PREFILTER[1], TIME_DERIVATIVE[2]
     cv2.addWeighted(first, float(outer), last, float(outer), 0.0, dst=smooth)
     cv2.scaleAdd(middle, float(centre), smooth, dst=smooth)
     cv2.addWeighted(last, float(slope), first, -float(slope), 0.0, dst=change)

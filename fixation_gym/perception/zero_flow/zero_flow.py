@@ -108,7 +108,7 @@ def zero_flow_test(
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
     answers = settings.rule(flow, usable, question, gaze.twist, gaze.inverse_distance, settings.depth_margin)
-    if gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance:
+    if gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance or flow.imperfect:
         _leave_the_decided(answers)
     outline = _outline(answers, gaze.inverse_distance, settings)
     moving = answers.moving & ~_mixed(answers.moving, outline, settings)
