@@ -30,6 +30,9 @@ class ReplayConfig(ReaderOptions):
     the masks or the box of the recording."""
     detector: str | None = None
     """Finds the target: colour, mean_shift, box (what the first box shows), or module:Class of your own."""
+    pose_noise: tuple[float, float] = (3.0, 0.5)
+    """Noise of the poses, mm and deg: what calibration of a camera in a hand usually leaves. It stays the same for a
+    while, so distances are not averaged as if every pose were as good as the arm's joints."""
     rerun: Path | None = None
     """Also write pictures, flow, map, target and camera path to this .rrd file, for the viewer Rerun."""
 
@@ -44,6 +47,8 @@ class ReplayConfig(ReaderOptions):
         parsed_target(self.target)
         if self.detector is not None:
             detector_named(self.detector)
+        if not all(math.isfinite(value) and value > 0.0 for value in self.pose_noise):
+            raise UsageError(f"--pose-noise must be two numbers above 0, mm and deg, got {self.pose_noise}")
         if self.rerun is not None and importlib.util.find_spec("rerun") is None:
             raise UsageError("--rerun needs rerun-sdk: pip install 'fixation-gym[viz]'")
 
@@ -52,7 +57,8 @@ class ReplayConfig(ReaderOptions):
         options = {name: getattr(self, name) for name in ReaderOptions.__dataclass_fields__}
         paths = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
         given = {name: value for name, value in paths.items() if value is not None}
-        return {"recording": str(self.recording), "target": self.target, "detector": self.detector, **given}
+        own = {"target": self.target, "detector": self.detector, "pose_noise": list(self.pose_noise)}
+        return {"recording": str(self.recording), **own, **given}
 
 
 def parsed_target(text: str | None) -> Box | Pixel | None:

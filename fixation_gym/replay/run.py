@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from contextlib import ExitStack, closing
@@ -18,6 +19,7 @@ from fixation_gym.evaluation.files import write_file, write_json
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import SUMMARY_FILE, check_no_folders, folder_lock, make_folder
 from fixation_gym.evaluation.video import VideoWriter, caption
+from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
@@ -59,7 +61,9 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
     target = choose_target(config, recording.target_box, ordered.frames[0], camera)
     straightener = Straightener(camera)
     left_px = check_poses(ordered.frames, camera.pinhole, straightener.image)
-    settings = PerceptionSettings()
+    position_mm, rotation_deg = config.pose_noise
+    noise = DistanceSettings(position_std_m=1e-3 * position_mm, rotation_std_rad=math.radians(rotation_deg))
+    settings = PerceptionSettings(distance=noise)
     perception = Perception(camera.pinhole, settings, straightener.unseen(), detector=target.detector)
     make_folder(out)
     with folder_lock(out):

@@ -1,6 +1,7 @@
 """Episodes that ``record`` wrote are what the policy met, and replay says of them what perception said then."""
 
 import csv
+import math
 import dataclasses
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.perception.detection.colour import ColourDetector
+from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.perception.pipeline import Perception
+from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.recordings.catalogue import open_recording
 from fixation_gym.replay.config import ReplayConfig
 from fixation_gym.replay.run import replay
@@ -90,7 +93,8 @@ def test_replay_says_what_perception_says_of_the_observations(recorded, met, tmp
     replay(ReplayConfig(recording=recorded / "opaque-000000", detector="colour"), tmp_path)
     with (tmp_path / "estimates.csv").open() as file:
         rows = list(csv.DictReader(file))
-    perception = Perception(camera, detector=ColourDetector(camera))
+    noise = DistanceSettings(position_std_m=3e-3, rotation_std_rad=math.radians(0.5))  # replay's, by default
+    perception = Perception(camera, PerceptionSettings(distance=noise), detector=ColourDetector(camera))
     for row, obs in zip(rows, observations, strict=True):
         percept = perception.update(Observation.from_dict(obs))
         assert float(row["distance_m"]) == percept.fixation.distance_m

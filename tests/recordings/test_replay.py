@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from dataclasses import replace as changed
 
 import cv2
@@ -26,7 +27,9 @@ from made_recordings import (
 from fixation_gym import cli
 from fixation_gym.errors import UsageError
 from fixation_gym.perception.detection.detector import GivenMasks
+from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.perception.pipeline import Perception
+from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.recordings.stamps import in_order
 from fixation_gym.replay.config import ReplayConfig
@@ -72,7 +75,8 @@ def test_distance_map_and_masks_are_judged_by_the_recordings_truth(masked):
 
 
 def test_estimates_are_those_of_the_same_perception_by_hand(masked):
-    perception = Perception(CAMERA, detector=GivenMasks())
+    noise = DistanceSettings(position_std_m=3e-3, rotation_std_rad=math.radians(0.5))  # by default
+    perception = Perception(CAMERA, PerceptionSettings(distance=noise), detector=GivenMasks())
     for frame, row in zip(made_frames(), estimates(masked[1]), strict=True):
         percept = perception.update(Observation.of_camera(frame.time, frame.rgb, frame.pose, mask=frame.mask))
         assert float(row["distance_m"]) == percept.fixation.distance_m
@@ -269,3 +273,8 @@ def test_without_the_viewers_package_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(UsageError, match=r"pip install 'fixation-gym\[viz\]'"):
         ReplayConfig(recording=tmp_path, rerun=tmp_path / "a.rrd").check()
+
+
+def test_noise_of_poses_must_be_above_nothing(tmp_path):
+    with pytest.raises(UsageError, match="--pose-noise must be two numbers above 0, mm and deg"):
+        ReplayConfig(recording=tmp_path, pose_noise=(1.0, 0.0)).check()
