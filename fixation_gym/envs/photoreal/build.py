@@ -68,17 +68,20 @@ def shape(mitsuba: Any, mesh: Mesh, material: Any) -> Any:
         "solid", len(mesh.vertices), len(mesh.faces), properties, has_vertex_normals=True, has_vertex_texcoords=True
     )
     parameters = mitsuba.traverse(made)
-    write_mesh(parameters, "", mesh)
     fill(parameters, "vertex_texcoords", mesh.uv)
     fill(parameters, "faces", mesh.faces)
-    parameters.update()
+    move(parameters, {"": mesh})
     return made
 
 
-def write_mesh(parameters: Any, prefix: str, mesh: Mesh) -> None:
-    """Set where a shape is."""
-    fill(parameters, f"{prefix}vertex_positions", mesh.vertices)
-    fill(parameters, f"{prefix}vertex_normals", mesh.normals)
+def move(parameters: Any, meshes: Mapping[str, Mesh]) -> None:
+    """Set where shapes are, by the beginnings of their parameters' names."""
+    for prefix, mesh in meshes.items():
+        fill(parameters, f"{prefix}vertex_positions", mesh.vertices)
+    parameters.update()
+    for prefix, mesh in meshes.items():  # afterwards, for when vertices change Mitsuba computes normals of its own
+        fill(parameters, f"{prefix}vertex_normals", mesh.normals)
+    parameters.update()
 
 
 def fill(parameters: Any, name: str, values: NDArray[Any]) -> None:

@@ -15,6 +15,8 @@ from fixation_gym.types import FloatArray
 _AROUND = 64
 """Corners of what is round. Their chords stay within 0.05 mm of a circle of 4 cm."""
 _BETWEEN_POLES = 32
+_LEAST_AREA = 1e-15
+"""Twice the area of faces that are none, m^2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,11 +124,13 @@ def turned_on_lathe(profile: FloatArray, normals: FloatArray) -> Mesh:
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(profile, axis=0), axis=1))])
     u = np.broadcast_to(4.0 * angles / (2.0 * math.pi), (len(profile), len(angles)))
     v = np.broadcast_to((lengths / lengths[-1])[:, None], u.shape)
-    vertices = swept(profile)
-    return Mesh(vertices, _with_area(vertices, faces), np.stack([u, v], axis=-1).reshape(-1, 2), swept(normals))
+    uv = np.stack([u, v], axis=-1).reshape(-1, 2)
+    return _without_empty_faces(Mesh(swept(profile), faces, uv, swept(normals)))
 
 
-def _with_area(vertices: FloatArray, faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The faces without those at a pole that have two corners in one place."""
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    return faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0]
+def _without_empty_faces(mesh: Mesh) -> Mesh:
+    """The mesh without faces that have two corners in one place, as at a pole, and without vertices of no face."""
+    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    faces = mesh.faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > _LEAST_AREA]
+    used, corners = np.unique(faces, return_inverse=True)
+    return Mesh(mesh.vertices[used], corners.reshape(-1, 3), mesh.uv[used], mesh.normals[used])

@@ -14,6 +14,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.envs.photoreal import meshes
@@ -28,7 +29,6 @@ _WALL, _FLOOR = 0.0025, 0.006
 """Thickness of the wall and of the bottom of vessels, m."""
 _LEVEL = 0.7
 """How full bottles of water are."""
-_NO_AREA = 1e-12
 _CLEAR = (1.0, 1.0, 1.0)
 _FINISHES: dict[str, Finish] = {
     scene_mjcf.MIRROR_MATERIAL: "mirror",
@@ -140,15 +140,17 @@ def vessel(
 
 
 def _from_file(model: Any, index: int) -> Mesh:
-    """A mesh of the model with flat faces."""
+    """Convex hull of a mesh of the model, which is what the simulator's contacts see of it, with flat faces."""
     start, count = model.mesh_vertadr[index], model.mesh_vertnum[index]
-    corners = model.mesh_face[model.mesh_faceadr[index] :][: model.mesh_facenum[index]]
-    triangles = model.mesh_vert[start : start + count][corners].astype(float)
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _NO_AREA)
+    points = model.mesh_vert[start : start + count].astype(float)
+    hull = ConvexHull(points)
+    triangles, outward = points[hull.simplices], hull.equations[:, :3]
+    sides = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    inward = np.sum(sides * outward, axis=1) < 0.0
+    triangles[inward] = triangles[inward, ::-1]
     vertices = triangles.reshape(-1, 3)
     faces = np.arange(len(vertices)).reshape(-1, 3)
-    return Mesh(vertices, faces, np.zeros((len(vertices), 2)), np.repeat(normals, 3, axis=0))
+    return Mesh(vertices, faces, np.zeros((len(vertices), 2)), np.repeat(outward, 3, axis=0))
 
 
 def _material(model: Any, geom: int) -> Material:
