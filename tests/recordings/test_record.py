@@ -1,8 +1,8 @@
 """Episodes that ``record`` wrote are what the policy met, and replay says of them what perception said then."""
 
 import csv
-import math
 import dataclasses
+import math
 
 import numpy as np
 import pytest
