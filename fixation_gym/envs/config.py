@@ -216,8 +216,8 @@ SCENARIOS: dict[str, Scenario] = {
             ("opaque", "translucent", "wire"),
             first_kinds=("bin",),
             obstacle_count=(2, 6),
-            free_elevation_deg=_reached(42.0, 80.0),
-            free_azimuth_shape=(1.25, 1.0),
+            free_elevation_deg=_reached(46.0, 82.0),
+            free_azimuth_shape=(1.3, 1.1),
         ),
         Scenario("clutter", PLAIN_MATERIALS, obstacle_count=(5, 9)),
         Scenario(
