@@ -158,6 +158,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self._running = True
         self._steps = self._steps_lifted = 0
         self._collided, self.percept, self.camera_on = False, None, True
+        self._image_time = -math.inf
         self._target_box = target_box(self.scene.target, self.sim.arm_state().camera_pose, self.intrinsics)
         self._state = self._task_state()
         self._camera = wrist_camera.switched_on(self.noise, self.data.qpos, self.model.opt.timestep, self._noise_rng)
@@ -267,7 +268,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self._arm = state = self.sim.arm_state()
         observation: dict[str, Any] = {}
         if self._image_size is not None:
-            if self.camera_on and self._camera.fresh:
+            if self.camera_on and self._camera.stamp_s != self._image_time:
                 light, exposure = partial(self._views.light, self.sim, self._noise_rng), self._errors.exposure
                 self._last_rgb = wrist_camera.picture(self._camera, self.noise, exposure, light, self._noise_rng)
                 self._image_time = self._camera.stamp_s

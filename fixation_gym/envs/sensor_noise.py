@@ -13,6 +13,10 @@ _RIG_FIELDS = 8
 """Number of the first fields of ``SensorNoise`` that rigs of experiments have, too."""
 
 
+_LONGEST_DELAY_S, _FRAME_RATES_HZ = 0.25, (5.0, 500.0)
+"""Bounds of the camera's delay and of its own rate: perception keeps poses for half a second."""
+
+
 @dataclass(frozen=True)
 class SensorNoise:
     """Errors of joint encoders, camera and hand-eye calibration; standard deviations unless said otherwise.
@@ -83,6 +87,7 @@ class SensorNoise:
         for name in ("frame_drops", "flicker"):
             if getattr(self, name) > 0.9:
                 raise ValueError(f"{name} must be within 0..0.9, got {getattr(self, name)!r}")
+        self._check_camera()
         if self.delay_s < self.least_delay_s:
             raise ValueError(
                 f"delay_s must be {self.least_delay_s} s or more, for an image is there when its last row is; "
@@ -92,6 +97,18 @@ class SensorNoise:
             raise ValueError(f"drift_time_s must be above 0, got {self.drift_time_s}")
         if self.lens:
             Lens(self.lens)
+
+    def _check_camera(self) -> None:
+        """Check what would make a camera that perception cannot follow, or none."""
+        if self.delay_s > _LONGEST_DELAY_S:
+            raise ValueError(f"delay_s must be {_LONGEST_DELAY_S} s or less, got {self.delay_s}")
+        lowest, highest = _FRAME_RATES_HZ
+        if self.frame_rate_hz and not lowest <= self.frame_rate_hz <= highest:
+            raise ValueError(f"frame_rate_hz must be 0 or within {lowest}..{highest}, got {self.frame_rate_hz}")
+        if not isinstance(self.lens, tuple):
+            raise ValueError(f"lens must be the coefficients of a lens, or none, got {self.lens!r}")
+        if self.flicker and not self.flicker_hz:
+            raise ValueError("flicker_hz must be above 0 where there is flicker")
 
     @property
     def of_every_rig(self) -> bool:

@@ -46,8 +46,6 @@ class CameraState:
     """Configurations after the last physics steps, the last is now, shape (n, nq)."""
     stamp_s: float
     """Middle of the exposure of the newest picture that is there, as its stamp says."""
-    fresh: bool
-    """Whether that came since the last control step."""
     tick: int
     """Number of the next picture of the camera's own clock ..."""
     first_s: float
@@ -58,6 +56,8 @@ class CameraState:
     """... but gets lost."""
     drift: FloatArray
     """Logarithms of the changed gains: of all channels, of red, of blue; shape (3,)."""
+    lamp_s: float
+    """By how much the light's flicker is ahead of the clock."""
 
     @property
     def now(self) -> float:
@@ -73,7 +73,8 @@ def switched_on(noise: SensorNoise, qpos: FloatArray, timestep: float, rng: np.r
     drift = _drift_scale(noise)
     if drift.any():
         drift = drift * rng.standard_normal(3)
-    state = CameraState(timestep, 0, qpos[None].copy(), stamp, True, 0, first, first, False, drift)
+    lamp = float(rng.uniform(0.0, 1.0 / noise.flicker_hz)) if noise.flicker else 0.0
+    state = CameraState(timestep, 0, qpos[None].copy(), stamp, 0, first, first, False, drift, lamp)
     return _next_tick(state, noise, rng) if noise.frame_rate_hz else state
 
 
@@ -88,15 +89,17 @@ def moved_on(state: CameraState, noise: SensorNoise, path: FloatArray, rng: np.r
     """
     substep = state.substep + len(path)
     oldest = noise.delay_s + noise.image_latency_s + noise.least_delay_s
+    if noise.frame_rate_hz:  # a picture may be waited for, and one get lost
+        oldest += 3.0 / noise.frame_rate_hz
     kept = len(path) + math.ceil(oldest / state.timestep) + _LONGEST_STRIDE + 1
-    before, elapsed = state.stamp_s, len(path) * state.timestep
+    elapsed = len(path) * state.timestep
     state = replace(state, substep=substep, path=np.concatenate([state.path, path])[-kept:])
     if not noise.frame_rate_hz:
         state = replace(state, stamp_s=state.now - noise.delay_s)
     while noise.frame_rate_hz and state.next_s + noise.delay_s <= state.now + 1e-9:
         state = replace(state, stamp_s=state.stamp_s if state.drops else state.next_s)
         state = _next_tick(state, noise, rng)
-    return replace(state, fresh=state.stamp_s > before, drift=_drifted(state.drift, elapsed, noise, rng))
+    return replace(state, drift=_drifted(state.drift, elapsed, noise, rng))
 
 
 def _next_tick(state: CameraState, noise: SensorNoise, rng: np.random.Generator) -> CameraState:
@@ -145,7 +148,7 @@ def picture(
         rng: of the noise.
     """
     light = exposed(state, noise, render)
-    return developed(light, noise, exposure, state.drift, state.stamp_s - noise.image_latency_s, rng)
+    return developed(light, noise, exposure, state.drift, state.stamp_s - noise.image_latency_s + state.lamp_s, rng)
 
 
 def exposed(state: CameraState, noise: SensorNoise, render: Callable[[FloatArray], ImageArray]) -> ImageArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -46,16 +47,18 @@ Every frame has the picture, and what fixation makes of it: the zero-flow map an
 
 - Frames: {summary["frames"]} at {CONTROL_FREQUENCY} Hz; pictures of {width}x{height} px.
 - Picked: {summary["successes"]} of {count}; with a collision: {summary["collisions"]}. Failures are part of the data.
-- Sensor noise: `{config.sensor_noise}`.
+- Sensor noise: `{config.sensor_noise}`; pictures by `{config.renderer}`.
 - Versions: {versions}; commit {summary["commit"]}.
 
 | scenario | episodes | picked |
 |---|---|---|
 {_by_scenario(episodes)}
 
-Made by `fixation-gym export --policy {config.policy} --scenario {",".join(config.scenarios)} --episodes \
-{config.episodes} --seed {config.seed} --format {config.format}`. The seed of each scene is kept beside its episode,
-and the same seed draws the same scene.
+Made by this command; the seed of each scene is kept beside its episode, and the same seed draws the same scene:
+
+```sh
+{_command(config)}
+```
 
 | column | numbers |
 |---|---|
@@ -66,6 +69,16 @@ and the same seed draws the same scene.
 Lengths are in m, angles in rad, times in s; poses are of the camera in the robot's base. The grey of a cell of the
 map is the probability that something there is nearer than the target, times 255; {UNKNOWN} is unknown.
 """
+
+
+def _command(config: ExportConfig) -> str:
+    height, width = config.surroundings.image_size
+    words = ["fixation-gym", "export", "--policy", config.policy, "--scenario", ",".join(config.scenarios)]
+    words += ["--episodes", str(config.episodes), "--seed", str(config.seed), "--format", config.format]
+    words += ["--sensor-noise", config.sensor_noise, "--image-size", str(height), str(width)]
+    words += ["--renderer", config.renderer]
+    words += [] if config.detector is None else ["--detector", config.detector]
+    return f"{shlex.join(words)} --out DIR"
 
 
 def _by_scenario(episodes: Sequence[Recorded]) -> str:

@@ -27,6 +27,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "observation.state": (*(f"joint_{joint}" for joint in range(1, ROBOT.arm.joints + 1)), "gripper_width"),
     "observation.camera_pose": ("x", "y", "z", "qw", "qx", "qy", "qz"),
     "observation.camera_twist": _TWIST,
+    "observation.image_time": ("s",),
     "observation.fixation": ("centroid_x", "centroid_y", "visible", "distance_m", "distance_std_m"),
     "next.reward": ("reward",),
     "next.success": ("success",),
@@ -142,6 +143,7 @@ def _decisions(cell: Mapping[str, Any]) -> Iterator[_Decision]:
             "observation.state": [*sensed["joint_pos"], *sensed["gripper_width"]],
             "observation.camera_pose": sensed["camera_pose"],
             "observation.camera_twist": sensed["camera_twist"],
+            "observation.image_time": sensed["image_time"],
             "observation.fixation": np.zeros(5) if percept is None else fixation_vector(percept.fixation),
             "action": np.array(action, np.float32),
         }

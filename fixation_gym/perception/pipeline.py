@@ -43,6 +43,8 @@ from fixation_gym.perception.zero_flow.zero_flow import (
 )
 from fixation_gym.types import FloatArray, MaskArray, Observation
 
+_STAMP_ROUNDING_S = 1e-3
+"""Stamps of 32 bits may be rounded apart, s."""
 _HIDDEN_S = 1.0
 """After this time out of sight the target's body may be anywhere, s."""
 
@@ -121,8 +123,12 @@ class Perception:
         nothing but how the camera moved since.
 
         Raises:
-            ValueError: if the image has the wrong shape or the time does not increase.
+            ValueError: if the image has the wrong shape, the pose is not finite, or times do not increase. What was
+                seen before stays as it was.
         """
+        if observation.rgb.ndim == 2:
+            observation = replace(observation, rgb=in_colour(observation.rgb))
+        self._check(observation)
         taken = observation.image_time
         if taken is not None:
             self._poses = self._poses.with_reading(observation)
@@ -134,9 +140,9 @@ class Perception:
 
     def _look(self, observation: Observation) -> Percept:
         """Take in an observation all of whose values are of one time."""
-        if observation.rgb.ndim == 2:
-            observation = replace(observation, rgb=in_colour(observation.rgb))
-        self._check(observation)
+        if self._frames and not observation.time > self._frames[-1].time:
+            last = self._frames[-1].time
+            raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
         if self._rectification is not None:
             observation = self._rectification.observation(observation)
         T_base_cam = pose_to_matrix(observation.camera_pose)
@@ -166,9 +172,9 @@ class Perception:
         pose = np.asarray(observation.camera_pose)
         if pose.shape != (7,) or not all(map(math.isfinite, pose.tolist())) or not any(pose[3:].tolist()):
             raise ValueError(f"camera_pose must be a finite position and quaternion (w, x, y, z), got {pose.tolist()}")
-        if self._frames and not observation.time > self._frames[-1].time:
-            last = self._frames[-1].time
-            raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
+        taken = observation.image_time
+        if taken is not None and not taken <= observation.time + _STAMP_ROUNDING_S:
+            raise ValueError(f"image_time must not be later than time, {observation.time} s, got {taken} s")
 
     def _twist(self, observation: Observation, T_base_cam: FloatArray) -> FloatArray:
         """The measured twist, or else the mean one since the frame before; a camera is at rest before its first."""

@@ -1,11 +1,14 @@
 """Clock, shutter, lens and development of the wrist camera against what they promise."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import cv2
+import gymnasium as gym
 import numpy as np
 import pytest
 
+import fixation_gym  # noqa: F401
 from fixation_gym.envs.development import developed
 from fixation_gym.envs.lens import bent_box, through_lens, wide_pinhole
 from fixation_gym.envs.sensor_noise import SENSOR_NOISE, SensorNoise
@@ -37,7 +40,6 @@ def ramp(qpos):
 def test_a_camera_without_a_clock_takes_a_picture_at_every_step():
     noise = SensorNoise(image_latency_s=0.008)
     for count, state in enumerate(running(noise, 5)):
-        assert state.fresh
         assert state.stamp_s == pytest.approx(0.04 * count)
         shown = exposed(state, noise, lambda qpos: qpos)
         assert shown[0] == pytest.approx(max(0.0, 0.04 * count - 0.008))
@@ -46,8 +48,9 @@ def test_a_camera_without_a_clock_takes_a_picture_at_every_step():
 def test_pictures_of_a_clock_arrive_late_in_order_and_some_never():
     noise = SensorNoise(frame_rate_hz=30.0, frame_jitter_s=1e-3, frame_drops=0.2, delay_s=0.03)
     states = list(running(noise, 2000))
-    stamps = np.array([state.stamp_s for state in states if state.fresh])
-    ages = np.array([state.now - state.stamp_s for state in states if state.fresh])
+    fresh = [now for before, now in pairwise(states) if now.stamp_s > before.stamp_s]
+    stamps = np.array([state.stamp_s for state in fresh])
+    ages = np.array([state.now - state.stamp_s for state in fresh])
     assert np.all(np.diff(stamps) > 0.0)
     assert np.all(ages >= 0.03 - 1e-9)
     # Steps between pictures are whole periods of the clock, with the jitter of two pictures.
@@ -164,3 +167,32 @@ def test_hue_light_and_compression_change_what_they_name():
 def test_noise_that_no_camera_has_is_refused_with_what_is_allowed(values, message):
     with pytest.raises(ValueError, match=message):
         SensorNoise(**values)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"delay_s": 20.0}, "delay_s must be 0.25 s or less"),
+        ({"frame_rate_hz": 1e6}, "frame_rate_hz must be 0 or within 5.0..500.0"),
+        ({"lens": 0.1}, "lens must be the coefficients"),
+        ({"flicker": 0.3, "flicker_hz": 0.0}, "flicker_hz must be above 0"),
+    ],
+)
+def test_what_is_no_camera_is_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        SensorNoise(**values)
+
+
+@pytest.mark.sim
+def test_a_camera_that_is_on_again_shows_its_newest_picture():
+    env = gym.make(
+        "FixationPick-v0", image_size=(48, 64), sensor_noise={"frame_rate_hz": 5.0, "delay_s": 0.03}
+    ).unwrapped
+    env.reset(seed=0)
+    env.camera_on = False
+    for _ in range(11):
+        env.step(np.zeros(7))
+    env.camera_on = True
+    observation, *_ = env.step(np.zeros(7))
+    assert observation["time"][0] - observation["image_time"][0] < 0.2 + 0.03 + 0.04
+    env.close()

@@ -105,6 +105,7 @@ def test_the_card_says_what_was_recorded_and_how(dataset):
     assert f"- Picked: {summary['successes']} of 2" in text
     assert f"Frames: {summary['frames']} at 25 Hz; pictures of 80x64 px" in text
     assert "| `clear` | 2 |" in text
+    assert "--sensor-noise nominal --image-size 64 80 --renderer mujoco" in text
     assert f"mujoco {summary['versions']['mujoco']}" in text
     assert all(f"`{name}`" in text for name in (*NAMES, *VIDEOS))
 

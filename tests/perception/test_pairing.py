@@ -95,3 +95,22 @@ def test_a_picture_of_now_is_taken_as_without_a_stamp():
         second = stamped.update(replace(observation, image_time=observation.time))
     np.testing.assert_array_equal(first.zfc.cells, second.zfc.cells)
     np.testing.assert_array_equal(first.fixation.point_base, second.fixation.point_base)
+
+
+def test_a_bad_reading_is_refused_and_leaves_no_trace():
+    perception, other = Perception(CAMERA), Perception(CAMERA)
+    for step in range(4):
+        good = late(START + PERIOD * step)
+        perception.update(good)
+        other.update(good)
+    good = late(START + PERIOD * 4)
+    for bad, message in (
+        (replace(good, camera_pose=np.full(7, np.nan)), "camera_pose must be a finite"),
+        (replace(good, rgb=np.zeros((5, 5, 3), np.uint8)), "rgb is uint8 of shape"),
+        (replace(good, image_time=good.time + 5.0), "image_time must not be later than time"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            perception.update(bad)
+    again, expected = perception.update(good), other.update(good)
+    np.testing.assert_array_equal(again.fixation.point_base, expected.fixation.point_base)
+    np.testing.assert_array_equal(again.zfc.cells, expected.zfc.cells)

@@ -11,6 +11,7 @@ import importlib.util
 import os
 import subprocess
 import sys
+from functools import cache
 from typing import Any
 
 from fixation_gym.errors import UsageError, check_names
@@ -104,10 +105,22 @@ def explain_choice() -> str:
 
 
 def why_no_llvm() -> str:
-    """Why LLVM's variant does not work here, as one sentence; empty if it does."""
+    """Why LLVM's variant does not work here, as one sentence; empty if it does. A library is tried once."""
+    return _trouble_with(os.environ.get("DRJIT_LIBLLVM_PATH", ""))
+
+
+@cache
+def _trouble_with(library: str) -> str:
+    """What a child process says that finds LLVM at ``library``, or where it usually is if that is empty."""
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": library} if library else None
     try:
         result = subprocess.run(
-            [sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=_PROBE_TIMEOUT_S, check=False
+            [sys.executable, "-c", _PROBE],
+            capture_output=True,
+            text=True,
+            timeout=_PROBE_TIMEOUT_S,
+            check=False,
+            env=environment,
         )
     except subprocess.TimeoutExpired:
         return f"it gave no picture within {_PROBE_TIMEOUT_S:.0f} s"

@@ -59,7 +59,12 @@ class BoxTracker:
         picture = picture_of(observation, self._camera)
         if self._known is None:
             box = checked_box(observation.target_box, self._full)
+            if not self._resized(box_filled(shape, box)).any():
+                size = f"{self._camera.width} x {self._camera.height}"
+                raise ValueError(f"target_box must hold more than a pixel of the image at {size}, got {list(box)}")
             mask = cut_out(observation.rgb, box, self._settings.surroundings)
+            if not self._resized(mask).any():
+                mask = box_filled(shape, box)
             self._time = observation.time
             if confusion(picture.rgb, self._resized(mask)) < self._settings.confusion:
                 self._known = first_shape(picture, self._resized(mask), self._settings.shape)
