@@ -15,6 +15,8 @@ from fixation_gym.types import FloatArray, ImageArray
 _EDGE_POINTS = 16
 _WIDEST = 2.0
 """Rays beyond this many half widths of the picture are not sought."""
+_SAME_PX = 0.1
+"""Rays that were found lead back to their pixels within this, px."""
 
 
 def pinhole_pixels(camera: Intrinsics) -> FloatArray:
@@ -31,7 +33,9 @@ def pinhole_pixels(camera: Intrinsics) -> FloatArray:
     found = cv2.undistortPoints(pixels, matrix, np.array(camera.lens.coefficients), P=matrix, criteria=until)
     found = np.asarray(found, np.float64).reshape(camera.height, camera.width, 2)
     size = np.array([camera.width, camera.height])
-    if not np.all(np.abs(found - 0.5 * size) < _WIDEST * 0.5 * size):
+    within = np.abs(found - 0.5 * size) < _WIDEST * 0.5 * size
+    # Beyond where a lens folds the picture over, no ray leads to a pixel, and what was found leads elsewhere.
+    if not np.all(within) or np.abs(_bent(found.reshape(-1, 2), camera) - pixels[:, 0]).max() > _SAME_PX:
         raise ValueError(f"the lens {camera.lens.coefficients} bends the border of the picture too far")
     return found
 
@@ -66,9 +70,16 @@ def bent_box(box: FloatArray, camera: Intrinsics) -> FloatArray:
     along = np.linspace(0.0, 1.0, _EDGE_POINTS)
     across, down = x - 0.5 + width * along, y - 0.5 + height * along  # pixel 0 begins at -0.5
     edge = [(u, v) for u in across for v in down[[0, -1]]] + [(u, v) for v in down for u in across[[0, -1]]]
-    rays = np.column_stack([camera.pinhole.normalise(np.array(edge)), np.ones(len(edge))])
-    bent, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.matrix, np.array(camera.lens.coefficients))
+    bent = _bent(np.array(edge), camera)
     size = np.array([camera.width, camera.height])
-    low = np.clip(np.floor(bent.min(axis=(0, 1)) + 0.5), 0, size)
-    high = np.clip(np.ceil(bent.max(axis=(0, 1)) + 0.5), 0, size)
+    low = np.clip(np.floor(bent.min(axis=0) + 0.5), 0, size)
+    high = np.clip(np.ceil(bent.max(axis=0) + 0.5), 0, size)
     return np.concatenate([low, high - low])
+
+
+def _bent(pixels: FloatArray, camera: Intrinsics) -> FloatArray:
+    """Where a camera with a lens sees what the pinhole with the same K sees at some pixels, shape (n, 2), px."""
+    assert camera.lens is not None
+    rays = np.column_stack([camera.pinhole.normalise(pixels), np.ones(len(pixels))])
+    bent, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.matrix, np.array(camera.lens.coefficients))
+    return np.asarray(bent, np.float64)[:, 0]

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fixation_gym.envs.development import developed
+from fixation_gym.envs.lens import wide_pinhole
 from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.envs.shutter import exposed_rows, row_weights
 from fixation_gym.geometry.camera import Intrinsics, Lens
@@ -29,9 +30,17 @@ _FARTHEST_JITTER = 0.45
 
 
 def intrinsics_of(image_size: tuple[int, int], noise: SensorNoise) -> Intrinsics:
-    """The wrist camera with its lens, for pictures of (height, width) px."""
+    """The wrist camera with its lens, for pictures of (height, width) px.
+
+    Raises:
+        ValueError: if the lens bends the border of the picture too far.
+    """
     pinhole = Intrinsics.from_fovy(*image_size, ROBOT.camera.fovy)
-    return replace(pinhole, lens=Lens(noise.lens) if noise.lens else None)
+    if not noise.lens:
+        return pinhole
+    camera = replace(pinhole, lens=Lens(noise.lens))
+    wide_pinhole(camera)
+    return camera
 
 
 @dataclass(frozen=True, eq=False)

@@ -196,3 +196,9 @@ def test_a_camera_that_is_on_again_shows_its_newest_picture():
     observation, *_ = env.step(np.zeros(7))
     assert observation["time"][0] - observation["image_time"][0] < 0.2 + 0.03 + 0.04
     env.close()
+
+
+@pytest.mark.parametrize("k1", [-1.5, -1.0, -0.8])
+def test_a_lens_that_folds_the_picture_over_is_refused_when_the_environment_is_made(k1):
+    with pytest.raises(ValueError, match="bends the border of the picture too far"):
+        gym.make("FixationPick-v0", sensor_noise={"lens": [k1, 0.0, 0.0, 0.0, 0.0]})
