@@ -193,6 +193,6 @@ def test_part_of_a_repeated_pattern_is_found_in_stills_by_how_the_camera_moved_b
 def test_a_box_that_vanishes_when_a_large_picture_is_reduced_is_refused():
     large = Intrinsics.from_fovy(960, 1280, 0.74)
     image = cv2.resize(table(), (1280, 960), interpolation=cv2.INTER_NEAREST)
-    seen = observation(image, target_box=np.array([601.0, 401.0, 3.0, 3.0]))
+    seen = observation(image, target_box=np.array([602.0, 402.0, 3.0, 3.0]))
     with pytest.raises(ValueError, match="must hold more than a pixel of the image at 320 x 240"):
         BoxTracker(large).detect(seen, FIRST_LOOK)
