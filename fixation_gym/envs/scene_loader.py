@@ -19,6 +19,7 @@ from fixation_gym.envs.scene_mjcf import (
     FINISH_MATERIALS,
     MIRROR_MATERIAL,
     RED_BODIES,
+    UNSET_RGBA,
     VISIBLE_GROUP,
     mujoco_size,
     obstacle_part_name,
@@ -29,8 +30,6 @@ from fixation_gym.envs.shapes import Part, Shape
 from fixation_gym.types import FloatArray, Vector
 
 _LABEL_RGBA = (0.85, 0.85, 0.25, 1.0)
-_UNSET = (0.5, 0.5, 0.5, 1.0)
-"""Colour of a geom that takes its material's."""
 
 _WRITTEN_FIELDS = (
     *("geom_type", "geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb", "geom_group", "geom_contype"),
@@ -119,7 +118,7 @@ class SceneLoader:
         clear, paint = obstacle.rgba, (*obstacle.rgba[:3], 1.0)
         colours = {"solid": obstacle.tint, "rim": obstacle.frame_rgba, "label": _LABEL_RGBA, "lacquer": paint}
         colours |= dict.fromkeys(("glass", "cup", "water", "plastic"), clear) | dict.fromkeys(
-            ("chrome", "brushed"), _UNSET
+            ("chrome", "brushed"), UNSET_RGBA
         )
         materials = {"solid": obstacle.texture, "mirror": MIRROR_MATERIAL} | {name: name for name in FINISH_MATERIALS}
         for geom, part in zip(self._slots[slot], obstacle.shape.parts, strict=False):

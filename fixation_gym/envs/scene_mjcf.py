@@ -33,6 +33,8 @@ TEXTURES = {
     "poster_tiles": "wood-tiles.png",
 }
 _FLAT = ("table", "poster")
+UNSET_RGBA = (0.5, 0.5, 0.5, 1.0)
+"""Colour of a geom that takes its material's."""
 MIRROR_MATERIAL = "mirror_glass"
 FINISH_MATERIALS = {
     "cup": {"specular": "0.8", "shininess": "0.8"},

@@ -113,6 +113,11 @@ class Intrinsics:
         """Intrinsics of the same view resampled to another size."""
         return _scaled(self, height, width)
 
+    def halved(self, width: int) -> Intrinsics:
+        """Intrinsics of the same view halved until it is no wider than ``width`` px."""
+        halvings = math.ceil(math.log2(max(1.0, self.width / width)))
+        return self.scaled(self.height >> halvings, self.width >> halvings)
+
     def project(self, points_cam: FloatArray) -> FloatArray:
         """Project points, shape (..., 3) in ``cam`` in m, to pixels, shape (..., 2); NaN behind the camera."""
         points = np.asarray(points_cam, dtype=np.float64)

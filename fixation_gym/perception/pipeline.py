@@ -88,10 +88,7 @@ class Perception:
         self.support_height_m = support_height_m
         self._detector: Detector = detector or ColourDetector(intrinsics, self._settings.colour)
         self._estimator: DistanceEstimator = estimator or PoseEstimator(self._settings.distance)
-        halvings = 0
-        while intrinsics.width > self._settings.flow.max_width * 2**halvings:
-            halvings += 1
-        self._working = intrinsics.scaled(shape[0] >> halvings, shape[1] >> halvings)
+        self._working = intrinsics.halved(self._settings.flow.max_width)
         self._scratch = Scratch()
         _run_once()
         self.reset()

@@ -23,8 +23,6 @@ from fixation_gym.envs.photoreal.meshes import Mesh
 from fixation_gym.types import FloatArray
 
 _GROUPS = (scene_mjcf.VISIBLE_GROUP, scene_mjcf.STAND_IN_GROUP)
-_UNSET = (0.5, 0.5, 0.5, 1.0)
-"""Colour of a geom that takes its material's."""
 _WALL, _FLOOR = 0.0025, 0.006
 """Thickness of the wall and of the bottom of vessels, m."""
 _LEVEL = 0.7
@@ -157,7 +155,7 @@ def _material(model: Any, geom: int) -> Material:
     rgba, index = model.geom_rgba[geom], model.geom_matid[geom]
     if index < 0:
         return Material("glass" if rgba[3] < 1.0 else "gloss", _rgb(rgba))
-    rgb = _rgb(model.mat_rgba[index] if np.allclose(rgba, _UNSET) else rgba)
+    rgb = _rgb(model.mat_rgba[index] if np.allclose(rgba, scene_mjcf.UNSET_RGBA) else rgba)
     finish = _FINISHES.get(_material_name(model, geom))
     if finish is not None:
         return Material(finish, rgb)

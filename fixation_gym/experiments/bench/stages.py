@@ -42,8 +42,7 @@ class _Moment:
 def stages(camera: Intrinsics, observations: Sequence[Observation]) -> Iterator[tuple[str, Callable[[], Any]]]:
     """Name of each stage and a function that runs it on the next moment of the recording."""
     moments = _moments(camera, observations)
-    halvings = math.ceil(math.log2(max(1.0, camera.width / _SETTINGS.flow.max_width)))
-    working = camera.scaled(camera.height >> halvings, camera.width >> halvings)
+    working = camera.halved(_SETTINGS.flow.max_width)
     scratch = Scratch()
     greys = [[prepare_grey(rgb, working.height, working.width) for rgb in m.rgbs] for m in moments]
 

@@ -13,7 +13,7 @@ from fixation_gym.perception.detection.coloured_shape import ColouredShape, firs
 from fixation_gym.perception.detection.detector import Sighting
 from fixation_gym.perception.detection.first_look import box_filled, checked_box, cut_out
 from fixation_gym.perception.detection.flat_patch import FlatPatch, first_patch
-from fixation_gym.perception.detection.picture import picture_of, working_camera
+from fixation_gym.perception.detection.picture import picture_of
 from fixation_gym.perception.detection.shape_settings import ShapeSettings
 from fixation_gym.perception.detection.tracking import Expectation
 from fixation_gym.types import MaskArray, Observation
@@ -41,7 +41,7 @@ class BoxTracker:
     def __init__(self, intrinsics: Intrinsics, settings: BoxTrackerSettings | None = None) -> None:
         """Prepare for the images of a camera."""
         self._full, self._settings = intrinsics, settings or BoxTrackerSettings()
-        self._camera = working_camera(intrinsics, self._settings.width)
+        self._camera = intrinsics.halved(self._settings.width)
         self.reset()
 
     def reset(self) -> None:

@@ -86,7 +86,7 @@ class ColouredShape:
     settings: ShapeSettings
     lost: bool = False
     settled: bool = True
-    """Whether its size is known: after it was lost for long it is seen anew, maybe at the border of an image."""
+    """Whether its size is known: when it comes back after long, maybe only a part of it is in the image."""
 
     def followed(self, picture: Picture, expected: Expectation) -> tuple[ColouredShape, MaskArray]:
         """What is known of it after an image, and its pixels, shape (h, w); none while it is lost."""

@@ -44,14 +44,6 @@ def angle_between(first: FloatArray, second: FloatArray) -> float:
     return math.acos(min(1.0, max(-1.0, float(first @ second))))
 
 
-def working_camera(camera: Intrinsics, width: int) -> Intrinsics:
-    """The camera of images halved until they are no wider than ``width`` px."""
-    halvings = 0
-    while camera.width > width * 2**halvings:
-        halvings += 1
-    return camera.scaled(camera.height >> halvings, camera.width >> halvings)
-
-
 def picture_of(observation: Observation, camera: Intrinsics) -> Picture:
     """An observation in the size of a camera."""
     rgb = observation.rgb
