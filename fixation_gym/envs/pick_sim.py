@@ -20,9 +20,9 @@ from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
 from fixation_gym.envs import contacts
 from fixation_gym.envs.motion import planned
 from fixation_gym.envs.movers import Mover
-from fixation_gym.envs.robosuite_backend import BASE_BODY, HAND_BODY, SceneExtension
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.envs.scene_loader import SceneLoader
+from fixation_gym.envs.task_mjcf import BASE_BODY, HAND_BODY, SceneExtension
 from fixation_gym.envs.task_model import compile_model
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.robots import ROBOT

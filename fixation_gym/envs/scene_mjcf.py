@@ -203,6 +203,25 @@ def remove_looks(asset: ET.Element, worldbody: ET.Element, robot_bodies: tuple[s
     for mesh in asset.findall("mesh"):
         if mesh.get("name") not in used:
             asset.remove(mesh)
+    _remove_hidden_textures(asset, worldbody)
+
+
+def _remove_hidden_textures(asset: ET.Element, worldbody: ET.Element) -> None:
+    """Take out materials that the wrist camera never sees: the table's, which scenes replace, and that of its legs.
+
+    GL stores a cube's texture six times: these would take 66 MB.
+    """
+    for geom in worldbody.iter("geom"):
+        if geom.get("material") == "table_ceramic":
+            geom.set("material", "table_wood")
+        elif geom.get("material") == "table_legs_metal":
+            del geom.attrib["material"]
+    hidden = {"table_ceramic": "tex-ceramic", "table_legs_metal": "tex-steel-brushed", "table_mat": "textable"}
+    for name, texture in hidden.items():
+        for tag, of_tag in (("material", name), ("texture", texture)):
+            element = asset.find(f"{tag}[@name='{of_tag}']")
+            if element is not None:
+                asset.remove(element)
 
 
 _FRONT_AXES = "0.58 0.81 0 -0.36 0.26 0.90"

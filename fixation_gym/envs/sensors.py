@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.geometry.rigid import inverse
@@ -113,7 +113,8 @@ _QUANTILE_BITS = 12
 def _normal_quantiles() -> NDArray[np.float32]:
     """Equally likely values of a standard normal variable, up to 3.7 of its standard deviations; read-only."""
     levels = 1 << _QUANTILE_BITS
-    quantiles = ndtri((np.arange(levels) + 0.5) / levels)
+    standard = NormalDist()
+    quantiles = np.array([standard.inv_cdf((level + 0.5) / levels) for level in range(levels)])
     table = (quantiles / quantiles.std()).astype(np.float32)
     table.setflags(write=False)
     return table

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from fixation_gym.envs import contacts, scene_mjcf
-from fixation_gym.envs.robosuite_backend import ROBOT_BODIES, SceneExtension, build_xml
+from fixation_gym.envs.task_mjcf import ROBOT_BODIES, SceneExtension, build_xml
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,6 +75,8 @@ class Perception:
         Raises:
             ValueError: if ``self_mask`` has not the size of the images.
         """
+        import scipy.optimize  # noqa: F401  # half a second now, and not in the middle of an episode
+
         shape = (intrinsics.height, intrinsics.width)
         if self_mask is not None and self_mask.shape != shape:
             raise ValueError(f"self_mask has shape {self_mask.shape}, but the images are {shape}")

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.optimize import least_squares
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.types import FloatArray, MaskArray
@@ -150,6 +149,8 @@ def fit_upright_body(
         settings: noise.
         start: an earlier fit to begin from; None tries several yaws about the expected one.
     """
+    from scipy.optimize import least_squares  # half a second to import
+
     planes = _Planes.of(outlines)
     noise = planes.pixel * settings.outline_std_px
 

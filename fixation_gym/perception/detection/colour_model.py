@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from fixation_gym.types import ImageArray, MaskArray
 
@@ -59,6 +58,8 @@ def colour_bins(rgb: ImageArray) -> BinArray:
 
 def histogram(bins: BinArray) -> Histogram:
     """Share of each colour among pixels, shape (n,), smoothed; all zero if there are none."""
+    from scipy.ndimage import gaussian_filter  # half a second to import
+
     counts = np.bincount(bins, minlength=int(np.prod(_BINS))).astype(np.float32).reshape(_BINS)
     smooth = gaussian_filter(counts, _SMOOTHING, mode="nearest", truncate=2.0)
     return np.asarray(smooth, np.float32).ravel() / np.float32(max(1, bins.size))
