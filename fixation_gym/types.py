@@ -116,4 +116,4 @@ class Command:
     camera_twist: FloatArray
     """Desired twist [v, w] of the camera expressed in ``cam``, shape (6,), m/s and rad/s."""
     gripper: float
-    """-1 opens, +1 closes."""
+    """Below 0 opens, above 0 closes, 0: the fingers stay as they are."""

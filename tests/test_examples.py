@@ -6,6 +6,8 @@ from pathlib import Path
 import cv2
 import pytest
 
+from fixation_gym.robot_loop import End, LoopSettings
+
 pytestmark = pytest.mark.sim
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
@@ -44,12 +46,19 @@ def test_a_shipped_agent_lifts_the_object(capsys):
     assert "% of the map in front" in capsys.readouterr().out
 
 
+def test_the_robot_loop_picks_or_ends_with_a_sentence(capsys):
+    example = load("06_robot_loop")
+    assert example.main("clear").end is End.HELD
+    assert example.main("clear", settings=LoopSettings(longest_s=0.1)).end is End.TIME
+    assert "time: 0.1 s are over; 4 periods, 0 of them late" in capsys.readouterr().out
+
+
 def test_the_contact_sheet_has_a_row_for_each_scenario(tmp_path):
-    path = load("06_contact_sheet").main(str(tmp_path / "scenes.png"), ("bin", "clear"), 2)
+    path = load("08_contact_sheet").main(str(tmp_path / "scenes.png"), ("bin", "clear"), 2)
     sheet = cv2.imread(str(path))
     assert sheet.shape == (2 * 180, 2 * 240, 3)
     with pytest.raises(SystemExit, match="cannot be written"):
-        load("06_contact_sheet").main(str(tmp_path / "nowhere" / "scenes.png"), ("clear",), 1)
+        load("08_contact_sheet").main(str(tmp_path / "nowhere" / "scenes.png"), ("clear",), 1)
 
 
 def test_the_path_is_drawn_over_the_front_view_where_the_camera_was(tmp_path):

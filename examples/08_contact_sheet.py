@@ -1,4 +1,4 @@
-"""Many scenes on one sheet, seen from the front: ``06_contact_sheet.py scenes.jpg``, or three of each that is named."""
+"""Many scenes on one sheet, seen from the front: ``08_contact_sheet.py scenes.jpg``, or three of each that is named."""
 
 import sys
 from collections.abc import Sequence
