@@ -6,7 +6,7 @@ import importlib.util
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import tyro
 
@@ -30,9 +30,11 @@ class ReplayConfig(ReaderOptions):
     the masks or the box of the recording."""
     detector: str | None = None
     """Finds the target: colour, mean_shift, box (what the first box shows), or module:Class of your own."""
+    estimator: Literal["calibrating", "pose"] = "calibrating"
+    """Tells the distance: calibrating learns errors of stamps, hand-eye and focal length as well; pose does not."""
     pose_noise: tuple[float, float] = (3.0, 0.5)
-    """Noise of the poses, mm and deg: what calibration of a camera in a hand usually leaves. It stays the same for a
-    while, so distances are not averaged as if every pose were as good as the arm's joints."""
+    """Errors of the poses, mm and deg: what calibration of a camera in a hand usually leaves. They stay the same for a
+    whole recording, and half as much differs from picture to picture."""
     rerun: Path | None = None
     """Also write pictures, flow, map, target and camera path to this .rrd file, for the viewer Rerun."""
 
@@ -57,7 +59,8 @@ class ReplayConfig(ReaderOptions):
         options = {name: getattr(self, name) for name in ReaderOptions.__dataclass_fields__}
         paths = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
         given = {name: value for name, value in paths.items() if value is not None}
-        own = {"target": self.target, "detector": self.detector, "pose_noise": list(self.pose_noise)}
+        own = {"target": self.target, "detector": self.detector, "estimator": self.estimator}
+        own |= {"pose_noise": list(self.pose_noise)}
         return {"recording": str(self.recording), **own, **given}
 
 

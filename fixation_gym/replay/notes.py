@@ -57,6 +57,7 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         lines.append(f"map against depth: {', '.join(values)}, over {map_['frames']} maps")
     if mask is not None:
         lines.append(f"mask: overlap {mask['median_overlap']:.2f} in the median, {mask['least_overlap']:.2f} at least")
+    lines += [f"alarm: {alarm}" for alarm in summary["alarms"]]
     return "\n".join([*lines, *(f"note: {note}" for note in summary["notes"])])
 
 

@@ -21,14 +21,14 @@ COLUMNS = (
     *("distance_m", "distance_std_m", "x_m", "y_m", "z_m", "nis", "distance_true_m", "mask_overlap"),
     *("map_time_s", "map_known", "map_front", "no_map"),
 )
-"""``x_m`` to ``z_m``: the target in base. ``map_known`` and ``map_front``: shares of the map's cells. ``no_map``: why
-there is none."""
+"""``distance_m``: from the true camera, as pictures show it. ``x_m`` to ``z_m``: the target in base. ``map_known`` and
+``map_front``: shares of the map's cells. ``no_map``: why there is none."""
 
 
 def row_of(look: Look, camera: Intrinsics, mask_overlap: float | None) -> Row:
     """What there is to say of one look; pixels are those of the undistorted picture."""
     percept, fixation = look.percept, look.percept.fixation
-    found = fixation.initialised
+    found, (depth, std) = fixation.initialised, fixation.depth_seen
     u, v = camera.project(np.array([*fixation.centroid, 1.0])) if fixation.visible else (None, None)
     why = no_map(look)
     cells = percept.zfc.cells
@@ -38,8 +38,8 @@ def row_of(look: Look, camera: Intrinsics, mask_overlap: float | None) -> Row:
         "visible": int(fixation.visible),
         "centroid_u_px": u,
         "centroid_v_px": v,
-        "distance_m": fixation.distance_m if found else None,
-        "distance_std_m": fixation.distance_std_m if found else None,
+        "distance_m": depth if found else None,
+        "distance_std_m": std if found else None,
         **dict(zip(("x_m", "y_m", "z_m"), fixation.point_base if found else (None,) * 3, strict=True)),
         "nis": fixation.nis if np.isfinite(fixation.nis) else None,
         "distance_true_m": look.truth.distance_m,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections import Counter
 from contextlib import ExitStack, closing
@@ -19,13 +18,15 @@ from fixation_gym.evaluation.files import write_file, write_json
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import SUMMARY_FILE, check_no_folders, folder_lock, make_folder
 from fixation_gym.evaluation.video import VideoWriter, caption
-from fixation_gym.perception.distance.pose_filter import DistanceSettings
+from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.recordings.catalogue import open_recording
 from fixation_gym.recordings.stamps import OrderedFrames, in_order
+from fixation_gym.replay.alarms import alarms_on, calibration_summary
 from fixation_gym.replay.config import ReplayConfig
+from fixation_gym.replay.estimators import chosen_estimator, learning_settings
 from fixation_gym.replay.figure import draw_distance
 from fixation_gym.replay.looks import Look, Straightener, looks
 from fixation_gym.replay.notes import notes_on
@@ -61,10 +62,10 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
     target = choose_target(config, recording.target_box, ordered.frames[0], camera)
     straightener = Straightener(camera)
     left_px = check_poses(ordered.frames, camera.pinhole, straightener.image)
-    position_mm, rotation_deg = config.pose_noise
-    noise = DistanceSettings(position_std_m=1e-3 * position_mm, rotation_std_rad=math.radians(rotation_deg))
-    settings = PerceptionSettings(distance=noise)
-    perception = Perception(camera.pinhole, settings, straightener.unseen(), detector=target.detector)
+    learning, estimator = learning_settings(config), chosen_estimator(config)
+    settings = PerceptionSettings()
+    unseen = straightener.unseen()
+    perception = Perception(camera.pinhole, settings, unseen, detector=target.detector, estimator=estimator)
     make_folder(out)
     with folder_lock(out):
         check_no_folders(out, FILES)
@@ -74,6 +75,7 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
         if done.rows:
             write_file(out / FIGURE_FILE, draw_distance(done.rows))
         gaps = ordered.gaps(settings.max_gap_s)
+        found = estimator.calibration if isinstance(estimator, CalibratingEstimator) else None
         summary = {
             "command": "replay",
             **config.run_description(),
@@ -89,6 +91,8 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
             "without_map": dict(Counter(row["no_map"] for row in done.rows if row["no_map"])),
             "unexplained_px": left_px,
             **done.scores(),
+            "calibration": None if found is None else calibration_summary(found, learning),
+            "alarms": alarms_on(found, learning, left_px),
             "perception_ms": 1000.0 * median(done.seconds) if done.seconds else None,
             "error": None if error is None else str(error),
             "versions": installed_versions(),

@@ -12,10 +12,12 @@ from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import exp_twist, mean_twist
 from fixation_gym.perception.distance.calibrating_filter import (
     CalibratingSettings,
-    Sighting,
     advance,
     distance_at,
+    noise_scale,
+    with_last_twist,
 )
+from fixation_gym.perception.distance.calibration_model import AGE, FOCAL, TWIST, Sighting
 
 DT = 0.04
 POSE_COV = np.diag([1e-4] * 3 + [2e-4] * 3) ** 2
@@ -200,3 +202,64 @@ def test_a_distance_that_was_never_known_does_not_bind_the_next_start():
         pose, sighting = sight(k * DT, 0.066, 0.02, rng, fixating=False)
         state = advance(state, sighting, DT, settings)
     assert distance_at(state, sighting).robot == pytest.approx(transform(inverse(pose), [0.066, 0, 0])[2], rel=0.05)
+
+
+def hand_poses(count):
+    """A camera that goes to and fro and whose gaze wanders."""
+    for k in range(count):
+        t = k * DT
+        place = np.array([0.05 * np.sin(3.1 * t), 0.09 * np.sin(2.3 * t), 0.06 * np.sin(3.7 * t + 1.0)])
+        yield fixating_pose(place, [0.6, 0.08 * np.sin(4.3 * t + 0.5), 0.06 * np.sin(5.1 * t)])
+
+
+def looked(poses, settings, magnified=1.0, noise=0.0, cov=POSE_COV, target=(0.6, 0.0, 0.0)):
+    """State and last sighting after poses of a camera that sees a point exactly, but magnified."""
+    state, poses, rng = None, list(poses), np.random.default_rng(3)
+    for k, pose in enumerate(poses):
+        before, after = poses[max(0, k - 1)], poses[min(len(poses) - 1, k + 1)]
+        q = transform(inverse(pose), np.array(target))
+        centroid = magnified * q[:2] / q[2] + rng.normal(0.0, noise, 2)
+        sighting = Sighting(pose, cov, mean_twist(before, after, DT), centroid)
+        state = advance(state, sighting, DT, settings)
+    return state, sighting, q
+
+
+@pytest.mark.parametrize("magnified", [1.02, 0.98])
+def test_a_wrong_focal_length_is_learnt_where_the_gaze_wanders(magnified):
+    settings = CalibratingSettings(focal=0.02, centroid_std=2e-4)
+    state, sighting, q = looked(hand_poses(150), settings, magnified, cov=1e-9 * np.eye(6))
+    assert state.mean[FOCAL] == pytest.approx(magnified - 1.0, abs=3e-3)
+    assert distance_at(state, sighting).lens == pytest.approx(q[2], rel=0.01)
+    blind, _, _ = looked(hand_poses(150), replace(settings, focal=0.0), magnified, cov=1e-9 * np.eye(6))
+    assert abs(blind.mean[FOCAL]) < 1e-6
+
+
+def test_noise_that_is_larger_than_stated_is_found_where_that_is_allowed():
+    settings = CalibratingSettings(centroid_std=2e-4)
+    state, sighting, q = looked(hand_poses(100), settings, noise=5e-4, cov=1e-12 * np.eye(6))
+    free = replace(settings, noise_dof=4.0)
+    scaled, _, _ = looked(hand_poses(100), free, noise=5e-4, cov=1e-12 * np.eye(6))
+    assert noise_scale(state, settings) == 1.0
+    assert np.sqrt(noise_scale(scaled, free)) == pytest.approx(2.5, rel=0.2)
+    sure, honest = distance_at(state, sighting), distance_at(scaled, sighting)
+    assert abs(honest.lens - q[2]) < 3.0 * honest.lens_std
+    assert honest.lens_std > 1.8 * sure.lens_std
+    quiet, _, _ = looked(hand_poses(100), free, noise=1e-4, cov=1e-12 * np.eye(6))
+    assert noise_scale(quiet, free) == 1.0  # a statement is never made finer than it is
+
+
+def test_the_true_cameras_depth_accounts_for_the_age_of_the_image():
+    state, _, sighting, _, _ = follow(0.4, 0.05)
+    moving = replace(sighting, twist=np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]))
+    aged = replace(state, mean=np.where(np.arange(len(state.mean)) == AGE, state.mean[AGE] + 0.02, state.mean))
+    assert distance_at(aged, moving).lens - distance_at(state, moving).lens == pytest.approx(0.5 * 0.02)
+    assert distance_at(aged, moving).robot == distance_at(state, moving).robot
+
+
+def test_a_twist_that_is_known_better_replaces_the_one_of_the_last_frame_alone():
+    state, _, _, _, _ = follow(0.4, 0.05)
+    better = with_last_twist(state, np.full(6, 0.5))
+    np.testing.assert_array_equal(better.window[-1, TWIST], np.full(6, 0.5))
+    np.testing.assert_array_equal(better.window[:-1], state.window[:-1])
+    rejected = replace(state, rejected=1)
+    assert with_last_twist(rejected, np.full(6, 0.5)) is rejected

@@ -6,7 +6,8 @@ from pinhole_scene import Scene, noise_texture, upright
 from test_pipeline_and_zero_flow import CAMERA, RED, TARGET, circling, frames
 
 from fixation_gym.perception import Perception, segment
-from fixation_gym.perception.distance import estimator, following
+from fixation_gym.perception.distance import following, own_motion
+from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
 from fixation_gym.perception.distance.covering import slide
 
 
@@ -32,7 +33,7 @@ def test_a_target_cut_by_the_image_border_says_nothing():
     assert slide(red_box(0, 40), red_box(0, 20), 1.0, 0.0, 0.04) == 0.0
 
 
-def largest_distance_error():
+def largest_distance_error(distance_estimator=None):
     """Over a circle of the camera on which a board hides between a fifth and four fifths of the target."""
     scene = Scene(
         [
@@ -41,7 +42,8 @@ def largest_distance_error():
             upright([0.3, -0.112, 0.0], 0.1, 0.1, noise_texture(3, (0.4, 0.6, 0.4))),
         ]
     )
-    frame, perception, errors = frames(scene, lambda t: circling(2.0 * t)), Perception(CAMERA), []
+    frame, errors = frames(scene, lambda t: circling(2.0 * t)), []
+    perception = Perception(CAMERA, estimator=distance_estimator)
     for k in range(80):
         observation, _, _, pose = frame(k)
         percept = perception.update(observation)
@@ -52,6 +54,7 @@ def largest_distance_error():
 
 def test_the_distance_holds_while_a_board_covers_most_of_the_target(monkeypatch):
     assert largest_distance_error() < 0.06
+    assert largest_distance_error(CalibratingEstimator()) < 0.06
     monkeypatch.setattr(following, "slide", lambda *_: 0.0)
-    monkeypatch.setattr(estimator, "contradiction", lambda *_: None)
+    monkeypatch.setattr(own_motion, "contradiction", lambda *_: None)
     assert largest_distance_error() > 0.1  # what the centroid alone makes of it

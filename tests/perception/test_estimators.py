@@ -7,8 +7,8 @@ import pytest
 from test_fixation_constraint import CAMERA, DT, circling, follow
 
 from fixation_gym.perception import Perception
+from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
 from fixation_gym.perception.distance.estimator import (
-    CalibratingEstimator,
     FlowEstimator,
     PoseEstimator,
     TwistEstimator,

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pinhole_scene import Scene, fixating_pose, noise_texture, upright
+from pinhole_scene import UP, Scene, fixating_pose, noise_texture, upright
+from scipy.spatial.transform import Rotation
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.geometry.rigid import matrix_to_pose
+from fixation_gym.geometry.rigid import look_at, matrix_to_pose
 
 CAMERA = Intrinsics(160, 120, 150.0, 152.0, 81.0, 58.0)
 TARGET = np.array([0.6, 0.0, 0.2])
@@ -32,23 +33,48 @@ class Made:
     distance: float
 
 
-@cache
-def made_frames() -> tuple[Made, ...]:
-    scene = Scene(
+def scene() -> Scene:
+    return Scene(
         [
             upright([1.0, 0.0, 0.2], 1.5, 1.2, noise_texture(1)),
             upright(TARGET, 0.06, 0.06, noise_texture(2, (1.0, 0.15, 0.1), 0.2)),
             upright([0.35, 0.08, 0.2], 0.02, 0.07, noise_texture(3)),
         ]
     )
+
+
+def made_frame(time: float, T: np.ndarray, seed: int) -> Made:
+    rgb, depth, index = scene().render(T, CAMERA, noise=1.0, seed=seed)
+    return Made(time, matrix_to_pose(T), rgb, depth, index == 1, float(T[:3, 2] @ (TARGET - T[:3, 3])))
+
+
+@cache
+def made_frames() -> tuple[Made, ...]:
     frames = []
     for step in range(COUNT):
         angle = 2.0 * np.pi * step / COUNT
         T = fixating_pose([0.0, 0.08 * np.sin(angle), 0.22 + 0.05 * np.cos(angle)], TARGET)
-        rgb, depth, index = scene.render(T, CAMERA, noise=1.0, seed=step)
-        distance = float(T[:3, 2] @ (TARGET - T[:3, 3]))
-        frames.append(Made(step * PERIOD, matrix_to_pose(T), rgb, depth, index == 1, distance))
+        frames.append(made_frame(step * PERIOD, T, step))
     return tuple(frames)
+
+
+HAND_PERIOD = 1.0 / 32.0
+"""Of the pictures of a camera in a hand, s."""
+
+
+def hand_pose(time: float) -> np.ndarray:
+    """A camera that is moved to and fro by a hand, with a gaze that wanders and sways."""
+    place = [0.03 * np.sin(3.1 * time), 0.09 * np.sin(2.3 * time), 0.22 + 0.06 * np.sin(3.7 * time + 1.0)]
+    aim = TARGET + np.array([0.0, 0.06 * np.sin(4.3 * time + 0.5), 0.05 * np.sin(5.1 * time)])
+    T = look_at(np.array(place), aim, UP).copy()
+    T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec([0.0, 0.0, 0.15 * np.sin(2.9 * time)]).as_matrix()
+    return T
+
+
+@cache
+def hand_frames() -> tuple[Made, ...]:
+    """Two seconds of a camera in a hand."""
+    return tuple(made_frame(k * HAND_PERIOD, hand_pose(k * HAND_PERIOD), k) for k in range(64))
 
 
 def bounding_box(mask) -> list[int]:

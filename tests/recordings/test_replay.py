@@ -4,6 +4,7 @@ import csv
 import json
 import math
 from dataclasses import replace as changed
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -27,12 +28,14 @@ from made_recordings import (
 from fixation_gym import cli
 from fixation_gym.errors import UsageError
 from fixation_gym.perception.detection.detector import GivenMasks
+from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
+from fixation_gym.perception.distance.estimator import PoseEstimator
 from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.recordings.stamps import in_order
 from fixation_gym.replay.config import ReplayConfig
+from fixation_gym.replay.estimators import learning_settings
 from fixation_gym.replay.run import FILES, replay
 from fixation_gym.types import Observation
 
@@ -74,13 +77,24 @@ def test_distance_map_and_masks_are_judged_by_the_recordings_truth(masked):
     assert json.loads((out / "summary.json").read_text()) == summary
 
 
-def test_estimates_are_those_of_the_same_perception_by_hand(masked):
-    noise = DistanceSettings(position_std_m=3e-3, rotation_std_rad=math.radians(0.5))  # by default
-    perception = Perception(CAMERA, PerceptionSettings(distance=noise), detector=GivenMasks())
-    for frame, row in zip(made_frames(), estimates(masked[1]), strict=True):
+def pose_estimator():
+    return PoseEstimator(DistanceSettings(position_std_m=3e-3, rotation_std_rad=math.radians(0.5)))
+
+
+def calibrating_estimator():
+    return CalibratingEstimator(learning_settings(ReplayConfig(recording=Path("any"), pose_noise=(3.0, 0.5))))
+
+
+@pytest.mark.parametrize("make", [pose_estimator, calibrating_estimator])
+def test_estimates_are_those_of_the_same_perception_by_hand(make, masked, tmp_path):
+    out = masked[1]
+    if make is pose_estimator:
+        out = tmp_path / "out"
+        assert run(write_layout(tmp_path / "recording"), out, estimator="pose")["calibration"] is None
+    perception = Perception(CAMERA, detector=GivenMasks(), estimator=make())
+    for frame, row in zip(made_frames(), estimates(out), strict=True):
         percept = perception.update(Observation.of_camera(frame.time, frame.rgb, frame.pose, mask=frame.mask))
-        assert float(row["distance_m"]) == percept.fixation.distance_m
-        assert float(row["distance_std_m"]) == percept.fixation.distance_std_m
+        assert (float(row["distance_m"]), float(row["distance_std_m"])) == percept.fixation.depth_seen
         assert float(row["distance_true_m"]) == frame.distance
         assert (row["no_map"] == "") == (percept.zfc.fixated_inverse_depth > 0.0)
         if row["no_map"] == "":

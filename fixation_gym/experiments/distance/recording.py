@@ -31,8 +31,8 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import look_at
 from fixation_gym.perception.detection.colour import segment
 from fixation_gym.perception.detection.segmentation import Segmentation
+from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
 from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings
-from fixation_gym.perception.distance.estimator import CalibratingEstimator
 from fixation_gym.perception.distance.flat_target import coverage, flat_centroid
 from fixation_gym.perception.distance.flow_samples import CutOut, sample_flow
 from fixation_gym.perception.distance.following import Frame, RigMeasurement

@@ -1,8 +1,9 @@
-"""The door for distance estimators, and the ones that are there; each is an object that keeps a state between frames.
+"""The door for distance estimators, and those that are there; each is an object that keeps a state between frames.
 
 ``PoseEstimator`` works on poses and centroids, and is checked by the motion of the target's own pixels. The paper's,
 ``FlowEstimator``, works on twist and flow, with the fixation constraint ("hard") or without ("free").
-``TwistEstimator`` has the constraint alone. ``CalibratingEstimator`` also learns the errors of the calibration.
+``TwistEstimator`` has the constraint alone. ``CalibratingEstimator``, in a file of its own, is as ``PoseEstimator`` and
+also learns the errors of the calibration.
 """
 
 from __future__ import annotations
@@ -15,10 +16,8 @@ from typing import Protocol
 
 import numpy as np
 
-from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception.detection.segmentation import Segmentation
-from fixation_gym.perception.distance import calibrating_filter, flow_filters, pose_filter
-from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings, CalibratingState, Sighting
+from fixation_gym.perception.distance import flow_filters, pose_filter
 from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze, ConstraintSettings, gaze_drift
 from fixation_gym.perception.distance.flow_filters import FlowFilterState, FlowSamples, Kind
 from fixation_gym.perception.distance.flow_samples import edge_samples
@@ -29,23 +28,15 @@ from fixation_gym.perception.distance.following import (
     follow_poses,
     mean_variance,
 )
+from fixation_gym.perception.distance.own_motion import OwnMotion
 from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState, Fixation
-from fixation_gym.perception.distance.target_motion import InverseDepth, contradiction, target_inverse_depth
+from fixation_gym.perception.distance.target_motion import InverseDepth
 from fixation_gym.perception.flow.optic_flow import Flow
-from fixation_gym.perception.zero_flow.zero_flow import widened_on_grid
-from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
 Frames = tuple[Frame, Frame, Frame]
 Follow = Callable[[DistanceState | None, Frame | None, Frame, DistanceSettings], tuple[DistanceState | None, bool]]
 """Advances the distance by a frame, as ``follow_poses`` does."""
-
-_OWN_DEPTHS = 5
-"""Frames over which the motion of the target's own pixels is believed."""
-_COVERED_S = 1.0
-"""For this time after something covered or uncovered the target its centroid is not to be trusted, s."""
-_MAX_GAP_S = 0.15
-"""Frames farther apart than this say nothing together, s."""
 
 
 class DistanceEstimator(Protocol):
@@ -73,12 +64,14 @@ def inverse_distance(estimator: DistanceEstimator, T_base_cam: FloatArray) -> In
     fixation = estimator.fixation(T_base_cam, None)
     if not fixation.initialised:
         return 0.0, 0.0
-    return 1.0 / fixation.distance_m, fixation.distance_std_m / fixation.distance_m**2
+    depth, std = fixation.depth_seen
+    return 1.0 / depth, std / depth**2
 
 
-def _described(
+def described(
     state: DistanceState | None, T_base_cam: FloatArray, seen: Segmentation | None, settings: DistanceSettings
 ) -> Fixation:
+    """What a state of the pose filter says of the target, for a camera at a pose, shape (4, 4)."""
     if seen is None or not seen.visible:
         return pose_filter.fixation_at(state, T_base_cam, settings)
     return pose_filter.fixation_at(state, T_base_cam, settings, seen.centroid, mean_variance(seen))
@@ -96,37 +89,26 @@ class PoseEstimator:
         """Forget everything."""
         self._state: DistanceState | None = None
         self._before: Frame | None = None
-        self._own_depths: deque[InverseDepth | None] = deque(maxlen=_OWN_DEPTHS)
-        self._covered_time = -math.inf
+        self._own = OwnMotion()
 
     def add_frame(self, frame: Frame) -> None:
         """Advance by a frame's pose and centroid."""
-        before = self._before
-        if not frame.segmentation.visible or (before is not None and frame.time - before.time > _MAX_GAP_S):
-            self._own_depths.clear()
-        self._state, covering = self._follow(self._state, before, frame, self._settings)
-        self._covered_time = frame.time if covering else self._covered_time
+        self._state, covering = self._follow(self._state, self._before, frame, self._settings)
+        self._own.note_frame(self._before, frame, covering)
         self._before = frame
 
     def add_flow(self, flow: Flow, frames: Frames) -> None:
         """Begin the distance again if the target's own motion contradicts what its centroid says."""
-        first, middle, last = frames
-        twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
-        target = widened_on_grid(middle.segmentation.mask, flow.overlap.shape, 0)
-        # None takes a place, too: what the motion said long ago is about another distance.
-        self._own_depths.append(target_inverse_depth(flow, twist, target))
-        recent = [own for own in self._own_depths if own is not None]
-        covered = last.time - self._covered_time < _COVERED_S
+        _, middle, last = frames
         assert self._state is not None, "the target was seen"
         depth, std, _ = pose_filter.distance_at(self._state, middle.T_base_cam, self._settings)
-        own = contradiction((1.0 / depth, std / depth**2), recent, covered)
+        own = self._own.contradiction((1.0 / depth, std / depth**2), flow, frames)
         if own is not None:
             self._state = begun_again(own, middle, last, self._settings)
-            self._own_depths.clear()
 
     def fixation(self, T_base_cam: FloatArray, seen: Segmentation | None) -> Fixation:
         """What is known of the target."""
-        return _described(self._state, T_base_cam, seen, self._settings)
+        return described(self._state, T_base_cam, seen, self._settings)
 
 
 class TwistEstimator:
@@ -155,7 +137,7 @@ class TwistEstimator:
 
     def fixation(self, T_base_cam: FloatArray, seen: Segmentation | None) -> Fixation:
         """What is known of the target."""
-        return _described(self._state, T_base_cam, seen, self._settings)
+        return described(self._state, T_base_cam, seen, self._settings)
 
 
 class FlowEstimator:
@@ -242,7 +224,7 @@ class FlowEstimator:
         last = self._frames[-1] if self._frames else None
         visible = self._filter is not None and last is not None and last.segmentation.visible
         state = self._anchored(last) if visible and last is not None else self._hidden
-        return _described(state, T_base_cam, seen, self._settings)
+        return described(state, T_base_cam, seen, self._settings)
 
 
 def _doubted(samples: FlowSamples) -> FlowSamples:
@@ -252,54 +234,3 @@ def _doubted(samples: FlowSamples) -> FlowSamples:
         return samples
     drift = np.median(samples.flow[finite], axis=0)
     return replace(samples, cov=samples.cov + float(drift @ drift) * len(samples.flow) * np.eye(2))
-
-
-class CalibratingEstimator:
-    """Poses and centroids over a window, with hand-eye error and image age among the unknowns."""
-
-    def __init__(self, settings: CalibratingSettings | None = None) -> None:
-        """Start without knowledge."""
-        self._settings = settings or CalibratingSettings(
-            centroid_std=1e-3, centroid_std_size=0.02, hand_eye_m=1e-3, hand_eye_rad=2e-3, image_age_s=8e-3
-        )
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the target and what was learnt of the calibration."""
-        self._state: CalibratingState | None = None
-        self._last: Sighting | None = None
-        self._time = -math.inf
-
-    def add_frame(self, frame: Frame) -> None:
-        """Add a frame to the window."""
-        dt = 0.0 if self._last is None else frame.time - self._time
-        self._last, self._time = _sighting(frame), frame.time
-        self._state = calibrating_filter.advance(self._state, self._last, dt, self._settings)
-
-    def add_flow(self, flow: Flow, frames: Frames) -> None:
-        """Flow is not used."""
-
-    def fixation(self, T_base_cam: FloatArray, seen: Segmentation | None) -> Fixation:
-        """What is known of the target."""
-        state, settings = self._state, self._settings
-        prior = DistanceSettings(settings.initial_distance_m, settings.initial_relative_std)
-        if state is None or self._last is None:
-            return _described(None, T_base_cam, seen, prior)
-        point = DistanceState(state.T_base_anchor, state.mean[:3], state.cov[:3, :3], state.nis)
-        now = calibrating_filter.distance_at(state, replace(self._last, T_base_cam=T_base_cam))
-        return replace(
-            _described(point, T_base_cam, seen, prior),
-            distance_m=now.robot,
-            distance_std_m=now.robot_std,
-            lens=(now.lens, now.lens_std),
-        )
-
-
-def _sighting(frame: Frame) -> Sighting:
-    """A frame as the calibrating filter takes it."""
-    seen = frame.segmentation
-    stds = [ROBOT.arm.position_std] * 3 + [ROBOT.arm.rotation_std] * 3
-    pose_cov = np.diag(np.square(stds)) if frame.rig is None else frame.rig.pose_cov
-    if not seen.visible:
-        return Sighting(frame.T_base_cam, pose_cov, frame.camera_twist, None)
-    return Sighting(frame.T_base_cam, pose_cov, frame.camera_twist, seen.centroid, math.sqrt(mean_variance(seen)))

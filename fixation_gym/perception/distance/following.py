@@ -71,10 +71,10 @@ def follow_poses(
     """
     seen, T_base_cam, covering = now.segmentation, now.T_base_cam, False
     if state is not None and before is not None:
-        slid = _slide(state, before, now, settings)
+        depth, _, point = distance.distance_at(state, T_base_cam, settings)
+        slid = slide_of(point, before, now)
         dt = now.time - before.time
-        covering = seen.visible and (not before.segmentation.visible or slid > _COVERING * _size(seen))
-        depth, _, _ = distance.distance_at(state, T_base_cam, settings)
+        covering = is_covering(before, now, slid)
         state = distance.predict(state, dt, settings, seen.visible, slid * depth)
     if not seen.visible:
         return state, covering
@@ -83,15 +83,29 @@ def follow_poses(
     return distance.update(state, seen.centroid, T_base_cam, settings, *_noise(seen)), covering
 
 
-def _slide(state: DistanceState, before: Frame, now: Frame, settings: DistanceSettings) -> float:
-    """Slide of the centroid since the frame before, normalised coordinates; a point that is followed does not slide."""
+def slide_of(point: FloatArray, before: Frame, now: Frame) -> float:
+    """Standard deviation of the slide of the centroid since the frame before, normalised coordinates.
+
+    A point that a detector follows does not slide.
+
+    Args:
+        point: the target in base, shape (3,), m.
+        before: the frame before.
+        now: this frame.
+    """
     if now.segmentation.centroid_std is not None:
         return 0.0
-    _, _, point = distance.distance_at(state, now.T_base_cam, settings)
     was, is_ = (point - frame.T_base_cam[:3, 3] for frame in (before, now))
     lengths = math.sqrt(was @ was), math.sqrt(is_ @ is_)
     turned = float(np.linalg.norm(cross(was, is_))) / (lengths[0] * lengths[1])
     return slide(before.segmentation, now.segmentation, lengths[0] / lengths[1], turned, now.time - before.time)
+
+
+def is_covering(before: Frame, now: Frame, slid: float) -> bool:
+    """Whether something covers or uncovers the target, by the slide of its centroid since the frame before."""
+    return now.segmentation.visible and (
+        not before.segmentation.visible or slid > _COVERING * size_of(now.segmentation)
+    )
 
 
 def follow_constraint(
@@ -127,14 +141,14 @@ def begun_again(own: InverseDepth, middle: Frame, last: Frame, settings: Distanc
     return distance.restart(seen.centroid, last.T_base_cam, now, std, settings, *_noise(seen))
 
 
-def _size(seen: Segmentation) -> float:
+def size_of(seen: Segmentation) -> float:
     """Standard deviation of the target's pixels about their centroid, normalised coordinates."""
     return math.sqrt(mean_variance(seen))
 
 
 def _noise(seen: Segmentation) -> tuple[float, bool, float | None]:
     """What the noise of the centroid depends on, as the filter takes it."""
-    return _size(seen), seen.touches_border, seen.centroid_std
+    return size_of(seen), seen.touches_border, seen.centroid_std
 
 
 def mean_variance(seen: Segmentation) -> float:

@@ -56,6 +56,11 @@ class DistanceSettings:
     flat_target: bool = False
     """Correct the slide of a flat target's centroid, Z (1 - 4 mu2); wrong for round ones."""
 
+    @property
+    def centroid_std(self) -> float:
+        """``centroid_std_px`` in normalised coordinates."""
+        return self.centroid_std_px / _REFERENCE_FOCAL_PX
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DistanceState:
@@ -93,6 +98,11 @@ class Fixation:
     """False until the object was seen once; then the point is only the prior guess on the optical axis."""
     lens: tuple[float, float] | None = None
     """Depth from the true camera and its standard deviation, m, if an estimator tells that from the believed one."""
+
+    @property
+    def depth_seen(self) -> tuple[float, float]:
+        """Depth from the true camera, as pictures show it, as far as it is known, and its standard deviation, m."""
+        return self.lens or (self.distance_m, self.distance_std_m)
 
 
 def initialise(
@@ -251,7 +261,7 @@ def _ray_std(settings: DistanceSettings, image_std: float, touches_border: bool,
     if centroid_std is not None:
         return math.hypot(centroid_std, settings.rotation_std_rad)
     share = settings.border_std_size if touches_border else settings.centroid_std_size
-    terms = (settings.centroid_std_px / _REFERENCE_FOCAL_PX, settings.rotation_std_rad, share * image_std)
+    terms = (settings.centroid_std, settings.rotation_std_rad, share * image_std)
     return math.hypot(*terms)
 
 
