@@ -13,6 +13,7 @@ import numpy as np
 
 from fixation_gym.perception.distance.calibrating_estimator import Calibration
 from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings
+from fixation_gym.replay.time_offset import TimeOffset
 
 _SURE = 3.0
 """Standard deviations from which on something is said."""
@@ -42,15 +43,24 @@ def calibration_summary(found: Calibration, settings: CalibratingSettings) -> di
     }
 
 
-def alarms_on(found: Calibration | None, settings: CalibratingSettings, left_px: float | None) -> list[str]:
+def alarms_on(
+    found: Calibration | None, settings: CalibratingSettings, left_px: float | None, offset: TimeOffset | None
+) -> list[str]:
     """Sentences on what is wrong.
 
     Args:
         found: what the calibrating estimator learnt; None if another was used, or the target was never seen.
         settings: with what was to be expected.
         left_px: what the poses leave unexplained of the pictures' motion, px; None: unknown.
+        offset: how late poses are against pictures; None: unknown.
     """
     alarms = []
+    if offset is not None and offset.counts:
+        late = "late" if offset.offset_s > 0.0 else "early"
+        alarms.append(
+            f"by the pictures, poses come {1e3 * abs(offset.offset_s):.0f} ms {late} (std "
+            f"{1e3 * offset.std_s:.1f} ms); every picture was given the pose of its own moment"
+        )
     if left_px is not None and left_px > _LARGEST_LEFT_PX:
         alarms.append(
             f"the poses leave {left_px:.1f} px of the pictures' motion unexplained: K, stamps or poses are wrong"

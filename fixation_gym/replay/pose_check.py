@@ -52,32 +52,41 @@ _OTHERS: dict[str, Reading] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Pair:
-    """Corners in two pictures, normalised coordinates, shape (n, 2) each, and the poses of both."""
+class CornerPair:
+    """Corners in two pictures, normalised coordinates, shape (n, 2) each, and times and poses of both."""
 
     before: FloatArray
     after: FloatArray
+    times: tuple[float, float]
     poses: tuple[FloatArray, FloatArray]
 
 
-def check_poses(
+def corner_pairs(
     frames: Sequence[RecordedFrame], camera: Intrinsics, straighten: Callable[[ImageArray], ImageArray]
-) -> float | None:
-    """Check poses against pictures.
+) -> list[CornerPair]:
+    """Corners that were followed between pictures; none where the camera hardly moved or pictures show nothing.
 
     Args:
         frames: in order, each with a pose.
         camera: pinhole.
         straighten: undistorts a picture.
+    """
+    return [pair for a, b in _chosen(frames) if (pair := _followed(a, b, camera, straighten)) is not None]
+
+
+def check_poses(pairs: Sequence[CornerPair], camera: Intrinsics) -> float | None:
+    """Check poses against pictures.
+
+    Args:
+        pairs: of corners.
+        camera: pinhole.
 
     Returns:
-        What the poses leave unexplained in the median, px; None where the camera hardly moved or pictures show nothing
-        to follow.
+        What the poses leave unexplained in the median, px; None without pairs.
 
     Raises:
         UsageError: if another reading of the poses explains the pictures far better, saying which.
     """
-    pairs = [pair for a, b in _chosen(frames) if (pair := _followed(a, b, camera, straighten)) is not None]
     if not pairs:
         return None
     left = _left(pairs, pose_to_matrix, camera)
@@ -126,7 +135,7 @@ def _pose(frame: RecordedFrame) -> FloatArray:
 
 def _followed(
     a: RecordedFrame, b: RecordedFrame, camera: Intrinsics, straighten: Callable[[ImageArray], ImageArray]
-) -> _Pair | None:
+) -> CornerPair | None:
     """Corners that are found again, forward and back; None if there are few."""
     try:
         first, second = (_grey(straighten(frame.image())) for frame in (a, b))
@@ -141,25 +150,31 @@ def _followed(
     if np.count_nonzero(same) < _LEAST_CORNERS:
         return None
     before, after = (camera.normalise(points[same, 0]) for points in (corners, moved))
-    return _Pair(before, after, (a.camera_pose, b.camera_pose))
+    return CornerPair(before, after, (a.time, b.time), (a.camera_pose, b.camera_pose))
 
 
 def _grey(image: ImageArray) -> ImageArray:
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
-def _left(pairs: Sequence[_Pair], reading: Reading, camera: Intrinsics) -> float:
+def _left(pairs: Sequence[CornerPair], reading: Reading, camera: Intrinsics) -> float:
     """Median over all corners of what a reading of the poses leaves unexplained, px."""
-    return camera.fx * float(np.median(np.concatenate([_unexplained(pair, reading) for pair in pairs])))
+    left = [unexplained(pair, *map(reading, pair.poses)) for pair in pairs]
+    return camera.fx * float(np.median(np.concatenate(left)))
 
 
-def _unexplained(pair: _Pair, reading: Reading) -> FloatArray:
+def unexplained(pair: CornerPair, T_base_before: FloatArray, T_base_after: FloatArray) -> FloatArray:
     """Distance of every corner from where the motion can have taken it, normalised coordinates, shape (n,).
 
     With inverse depth d a corner x goes to the image of R [x, 1] + d t: a way that begins at d = 0, the pure turn, and
     ends at the depth of the nearest thing. Distances are to the straight line between the two.
+
+    Args:
+        pair: of pictures.
+        T_base_before: pose of the camera at the first, shape (4, 4).
+        T_base_after: pose at the second, shape (4, 4).
     """
-    T_after_before = inverse(reading(pair.poses[1])) @ reading(pair.poses[0])
+    T_after_before = inverse(T_base_after) @ T_base_before
     rays = np.column_stack([pair.before, np.ones(len(pair.before))]) @ T_after_before[:3, :3].T
     ends = []
     for inverse_depth in (0.0, 1.0 / _NEAREST_M):

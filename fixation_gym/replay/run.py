@@ -18,6 +18,7 @@ from fixation_gym.evaluation.files import write_file, write_json
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import SUMMARY_FILE, check_no_folders, folder_lock, make_folder
 from fixation_gym.evaluation.video import VideoWriter, caption
+from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.pipeline import Perception
@@ -30,10 +31,11 @@ from fixation_gym.replay.estimators import chosen_estimator, learning_settings
 from fixation_gym.replay.figure import draw_distance
 from fixation_gym.replay.looks import Look, Straightener, looks
 from fixation_gym.replay.notes import notes_on
-from fixation_gym.replay.pose_check import check_poses
+from fixation_gym.replay.pose_check import check_poses, corner_pairs
 from fixation_gym.replay.rows import ESTIMATES_FILE, Row, RowWriter, row_of
 from fixation_gym.replay.scores import distance_summary, map_counts, map_summary, mask_summary, overlap
 from fixation_gym.replay.target import Target, choose_target
+from fixation_gym.replay.time_offset import TimeOffset, put_right, time_offset
 
 VIDEO_FILE, FIGURE_FILE = "overlay.mp4", "distance.png"
 FILES = (ESTIMATES_FILE, VIDEO_FILE, FIGURE_FILE, SUMMARY_FILE)
@@ -61,7 +63,7 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
     ordered = in_order(recording, str(config.recording))
     target = choose_target(config, recording.target_box, ordered.frames[0], camera)
     straightener = Straightener(camera)
-    left_px = check_poses(ordered.frames, camera.pinhole, straightener.image)
+    ordered, left_px, offset = _checked_poses(ordered, camera.pinhole, straightener)
     learning, estimator = learning_settings(config), chosen_estimator(config)
     settings = PerceptionSettings()
     unseen = straightener.unseen()
@@ -90,9 +92,11 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
             "seen": sum(row["visible"] for row in done.rows),
             "without_map": dict(Counter(row["no_map"] for row in done.rows if row["no_map"])),
             "unexplained_px": left_px,
+            "pose_delay_ms": None if offset is None else 1e3 * offset.offset_s,
+            "pose_delay_std_ms": None if offset is None else 1e3 * offset.std_s,
             **done.scores(),
             "calibration": None if found is None else calibration_summary(found, learning),
-            "alarms": alarms_on(found, learning, left_px),
+            "alarms": alarms_on(found, learning, left_px, offset),
             "perception_ms": 1000.0 * median(done.seconds) if done.seconds else None,
             "error": None if error is None else str(error),
             "versions": installed_versions(),
@@ -104,6 +108,18 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
     if error is not None:
         raise UsageError(f"{error}; {len(done.rows)} pictures before it are in {out}")
     return summary
+
+
+def _checked_poses(
+    ordered: OrderedFrames, camera: Intrinsics, straightener: Straightener
+) -> tuple[OrderedFrames, float | None, TimeOffset | None]:
+    """Frames with the poses of their own moments, what these leave unexplained, px, and how late they came."""
+    pairs = corner_pairs(ordered.frames, camera, straightener.image)
+    left_px, offset = check_poses(pairs, camera), time_offset(ordered.frames, pairs, camera)
+    if offset is not None and offset.counts:
+        ordered = put_right(ordered, offset.offset_s)
+        left_px = check_poses(corner_pairs(ordered.frames, camera, straightener.image), camera)
+    return ordered, left_px, offset
 
 
 def _remove_earlier(out: Path) -> None:

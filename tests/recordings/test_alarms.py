@@ -18,10 +18,16 @@ from scipy.spatial.transform import Rotation
 
 from fixation_gym.geometry.rigid import matrix_to_pose, pose_to_matrix
 from fixation_gym.perception.distance.calibrating_estimator import Calibration
+from fixation_gym.recordings.recording import RecordedFrame
+from fixation_gym.recordings.stamps import OrderedFrames
+from fixation_gym.replay import run
 from fixation_gym.replay.alarms import alarms_on
 from fixation_gym.replay.config import ReplayConfig
 from fixation_gym.replay.estimators import learning_settings
 from fixation_gym.replay.run import replay
+from fixation_gym.replay.time_offset import TimeOffset, put_right, time_offset
+
+IMAGE = np.zeros((120, 160), np.uint8)
 
 
 def judged(folder, frames, camera=CAMERA, **options):
@@ -41,10 +47,15 @@ def turned(degrees, millimetres):
     return [replace(frame, pose=matrix_to_pose(pose_to_matrix(frame.pose) @ T)) for frame in hand_frames()]
 
 
-def test_without_errors_nothing_is_said_and_nothing_is_found(tmp_path):
-    summary = judged(tmp_path, hand_frames())
-    found = summary["calibration"]
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    return judged(tmp_path_factory.mktemp("clean"), hand_frames())
+
+
+def test_without_errors_nothing_is_said_and_nothing_is_found(clean):
+    summary, found = clean, clean["calibration"]
     assert summary["alarms"] == []
+    assert abs(summary["pose_delay_ms"]) < 1.0
     assert abs(found["image_age_ms"]) < 2.0 * found["image_age_std_ms"] < 10.0
     assert abs(found["focal_percent"]) < 2.0 * found["focal_std_percent"]
     assert found["noise_ratio"] < 0.5  # exact poses are better than --pose-noise says
@@ -52,16 +63,34 @@ def test_without_errors_nothing_is_said_and_nothing_is_found(tmp_path):
     assert summary["distance"]["median_abs_error_m"] < 0.01
 
 
-@pytest.mark.parametrize("frames_late", [1, -1])
-def test_poses_a_frame_late_or_early_are_said_and_their_offset_is_found(frames_late, tmp_path):
-    frames = [
-        replace(frame, pose=matrix_to_pose(hand_pose((k - frames_late) * HAND_PERIOD)))
+def late(frames):
+    """Frames with the poses of so many pictures before."""
+    return [
+        replace(frame, pose=matrix_to_pose(hand_pose((k - frames) * HAND_PERIOD)))
         for k, frame in enumerate(hand_frames())
     ]
-    summary = judged(tmp_path, frames)
-    offset = -1e3 * frames_late * HAND_PERIOD
-    assert summary["calibration"]["image_age_ms"] == pytest.approx(offset, abs=6.0)
-    assert any("than their poses" in alarm and "correct the stamps" in alarm for alarm in summary["alarms"])
+
+
+@pytest.mark.parametrize(("frames_late", "left_out"), [(1, 0), (-1, 0), (2.6, 2)])
+def test_late_and_early_poses_are_put_right_by_the_pictures_and_said(frames_late, left_out, clean, tmp_path):
+    summary = judged(tmp_path, late(frames_late))
+    assert summary["pose_delay_ms"] == pytest.approx(1e3 * frames_late * HAND_PERIOD, abs=1.0)
+    (alarm,) = summary["alarms"]
+    assert "every picture was given the pose of its own moment" in alarm
+    assert ("late" if frames_late > 0 else "early") in alarm
+    assert abs(summary["calibration"]["image_age_ms"]) < 3.0 * summary["calibration"]["image_age_std_ms"]
+    assert summary["distance"]["median_abs_error_m"] < clean["distance"]["median_abs_error_m"] + 5e-3
+    assert summary["map"]["precision"] > clean["map"]["precision"] - 0.02
+    assert summary["unexplained_px"] < 1.5 * clean["unexplained_px"]
+    assert summary["without_pose"] == left_out  # beyond the end one pose is made up, the others are not known
+
+
+def test_late_poses_are_learnt_by_the_distance_where_pictures_do_not_tell(monkeypatch, tmp_path):
+    monkeypatch.setattr(run, "time_offset", lambda *_: None)
+    summary = judged(tmp_path, late(1))
+    assert summary["pose_delay_ms"] is None
+    assert summary["calibration"]["image_age_ms"] == pytest.approx(-1e3 * HAND_PERIOD, abs=6.0)
+    assert any("newer than their poses" in alarm and "correct the stamps" in alarm for alarm in summary["alarms"])
     assert summary["distance"]["median_abs_error_over_std"] < 3.0
 
 
@@ -112,7 +141,18 @@ NOTHING = Calibration(
 )
 def test_each_contradiction_has_its_sentence(wrong, sentence):
     settings = learning_settings(ReplayConfig(recording=Path("any")))
-    assert alarms_on(NOTHING, settings, 0.2) == []
-    (alarm,) = alarms_on(replace(NOTHING, **wrong), settings, 0.2)
+    assert alarms_on(NOTHING, settings, 0.2, TimeOffset(0.03, 0.02, False)) == []
+    (alarm,) = alarms_on(replace(NOTHING, **wrong), settings, 0.2, None)
     assert sentence in alarm
-    assert "2.0 px" in alarms_on(None, settings, 2.0)[0]
+    assert "2.0 px" in alarms_on(None, settings, 2.0, None)[0]
+
+
+def test_stills_have_no_offset_and_keep_their_poses():
+    frames = [
+        RecordedFrame("", 0.5 * k, image=lambda: IMAGE, camera_pose=frame.pose)
+        for k, frame in enumerate(hand_frames()[:5])
+    ]
+    assert time_offset(frames, [], CAMERA) is None
+    right = put_right(OrderedFrames(frames, 0, 0, 0), 0.03).frames
+    for before, after in zip(frames, right, strict=True):
+        np.testing.assert_array_equal(before.camera_pose, after.camera_pose)

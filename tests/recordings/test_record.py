@@ -90,7 +90,7 @@ def test_depth_and_mask_are_those_of_the_target(recorded, met):
 
 def test_replay_says_what_perception_says_of_the_observations(recorded, met, tmp_path):
     observations, camera, _ = met
-    replay(ReplayConfig(recording=recorded / "opaque-000000", detector="colour"), tmp_path)
+    replay(ReplayConfig(recording=recorded / "opaque-000000", detector="colour", estimator="pose"), tmp_path)
     with (tmp_path / "estimates.csv").open() as file:
         rows = list(csv.DictReader(file))
     noise = DistanceSettings(position_std_m=3e-3, rotation_std_rad=math.radians(0.5))  # replay's, by default

@@ -103,7 +103,7 @@ class CalibratingState:
     rejected: int = 0
     """Consecutive centroids that failed the gate."""
     restarts: int = 0
-    """How often it began again since the first sight."""
+    """How often the target was not where it should be, so that it began again."""
     past: Misfit = field(default_factory=Misfit)
     """Of the windows before."""
     present: Misfit = field(default_factory=Misfit)
@@ -232,12 +232,11 @@ def _centroid_std(sighting: Sighting, settings: CalibratingSettings) -> float:
 
 
 def _restart(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
-    """Begin again where the target is seen now, at the distance it had, unless that was hardly known.
+    """Begin again where the target is seen now, at the distance it had, or, if that was hardly known, the first guess.
 
-    Noise of the first, nearly resting frames can put it far off; as a prior it would keep every following start from
-    the truth, so that one begins with the first guess.
+    Noise of the first, nearly resting frames can put it far off; as a prior it would bind every following start.
     """
-    before = distance_at(state, sighting)
+    before, state = distance_at(state, sighting), replace(state, restarts=state.restarts + 1)
     if before.robot_std < _KNOWN_RELATIVE_STD * before.robot:
         spread = math.hypot(before.robot_std, settings.jump_std_m)
         return begun_again(state, sighting, before.robot, spread, settings)
@@ -263,7 +262,7 @@ def begun_again(
         cov[2, 2] = min(std * rho**2, settings.initial_relative_std * rho) ** 2
     mean[3:], cov[3:, 3:] = state.mean[3:], state.cov[3:, 3:]
     past = state.past + state.present
-    prior = replace(_collapse(replace(fresh, mean=mean, cov=cov)), past=past, restarts=state.restarts + 1)
+    prior = replace(_collapse(replace(fresh, mean=mean, cov=cov)), past=past, restarts=state.restarts)
     return _update(prior, sighting, settings)
 
 
