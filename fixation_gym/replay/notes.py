@@ -51,6 +51,12 @@ def format_summary(summary: Mapping[str, Any]) -> str:
             f"({100 * distance['median_relative_error']:+.1f} %), |error|/std "
             f"{distance['median_abs_error_over_std']:.1f} in the median, over {distance['frames']} pictures"
         )
+    at_once = None if summary["triangulation"] is None else summary["triangulation"]["distance"]
+    if distance is not None and at_once is not None and at_once["frames"]:
+        lines.append(
+            f"one triangulation of all: median |error| {1000 * at_once['median_abs_error_m']:.1f} mm, at the last "
+            f"picture {1000 * at_once['last_error_m']:+.1f} mm (picture by picture {_last(distance)})"
+        )
     if map_ is not None:
         names = ("sign_right", "precision", "recall", "false_alarms", "clear_cells_alarmed")
         values = (f"{name.replace('_', ' ')} {_ratio(map_[name])}" for name in names)
@@ -59,6 +65,10 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         lines.append(f"mask: overlap {mask['median_overlap']:.2f} in the median, {mask['least_overlap']:.2f} at least")
     lines += [f"alarm: {alarm}" for alarm in summary["alarms"]]
     return "\n".join([*lines, *(f"note: {note}" for note in summary["notes"])])
+
+
+def _last(distance: Mapping[str, Any]) -> str:
+    return f"{1000 * distance['last_error_m']:+.1f} mm" if distance["frames"] else "unknown"
 
 
 def _ratio(value: float | None) -> str:

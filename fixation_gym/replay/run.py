@@ -20,6 +20,7 @@ from fixation_gym.evaluation.storage import SUMMARY_FILE, check_no_folders, fold
 from fixation_gym.evaluation.video import VideoWriter, caption
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
+from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
@@ -36,6 +37,7 @@ from fixation_gym.replay.rows import ESTIMATES_FILE, Row, RowWriter, row_of
 from fixation_gym.replay.scores import distance_summary, map_counts, map_summary, mask_summary, overlap
 from fixation_gym.replay.target import Target, choose_target
 from fixation_gym.replay.time_offset import TimeOffset, put_right, time_offset
+from fixation_gym.replay.triangulation import Sight, sight_of, triangulation_summary
 
 VIDEO_FILE, FIGURE_FILE = "overlay.mp4", "distance.png"
 FILES = (ESTIMATES_FILE, VIDEO_FILE, FIGURE_FILE, SUMMARY_FILE)
@@ -72,7 +74,7 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
     with folder_lock(out):
         check_no_folders(out, FILES)
         _remove_earlier(out)
-        done = _Done(camera.pinhole)
+        done = _Done(camera.pinhole, learning)
         error = _perceive(config, out, ordered, perception, target, straightener, done)
         if done.rows:
             write_file(out / FIGURE_FILE, draw_distance(done.rows))
@@ -137,16 +139,18 @@ def _remove_earlier(out: Path) -> None:
 class _Done:
     """What has been perceived so far: rows and sums."""
 
-    def __init__(self, camera: Any) -> None:
+    def __init__(self, camera: Intrinsics, learning: CalibratingSettings) -> None:
         self.rows: list[Row] = []
         self.seconds: list[float] = []
-        self._camera = camera
+        self._camera, self._learning = camera, learning
+        self._sights: list[Sight] = []
         self._overlaps: list[float] = []
         self._counts: Counter[str] = Counter()
         self._maps = 0
 
     def add(self, look: Look) -> Row:
         """Note a look; returns its row."""
+        self._sights.append(sight_of(look, self._learning))
         mask, shared = look.truth.mask, None
         if mask is not None:
             shared = overlap(look.percept.segmentation.mask, mask)
@@ -166,6 +170,7 @@ class _Done:
             "distance": distance_summary(self.rows),
             "map": map_summary(self._counts, self._maps) if self._maps else None,
             "mask": mask_summary(np.array(self._overlaps)) if self._overlaps else None,
+            "triangulation": triangulation_summary(self._sights, self._learning),
         }
 
 

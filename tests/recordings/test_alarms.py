@@ -63,6 +63,14 @@ def test_without_errors_nothing_is_said_and_nothing_is_found(clean):
     assert summary["distance"]["median_abs_error_m"] < 0.01
 
 
+def test_one_triangulation_of_all_centroids_is_judged_beside(clean):
+    at_once = clean["triangulation"]
+    assert at_once["distance"]["frames"] == len(hand_frames())  # it knows from the first picture on
+    assert at_once["distance"]["median_abs_error_m"] < 0.005
+    assert abs(at_once["image_age_ms"]) < 3.0 * at_once["image_age_std_ms"]
+    assert clean["distance"]["last_error_m"] == pytest.approx(at_once["distance"]["last_error_m"], abs=0.01)
+
+
 def late(frames):
     """Frames with the poses of so many pictures before."""
     return [

@@ -159,15 +159,31 @@ class CalibratingEstimator:
 
     def _sighting(self, frame: Frame, dt: float, slid: float) -> Sighting:
         """A frame as the filter takes it."""
-        seen, settings = frame.segmentation, self._settings
-        stds = [settings.position_std_m] * 3 + [settings.rotation_std_rad] * 3
-        pose_cov = np.diag(np.square(stds)) if frame.rig is None else frame.rig.pose_cov
         # Across a gap the mean motion is none that the camera had when the picture was taken.
         twist = frame.camera_twist if dt <= MAX_GAP_S else np.zeros(6)
-        if not seen.visible:
-            return Sighting(frame.T_base_cam, pose_cov, twist, None)
-        size, std = size_of(seen), seen.centroid_std
-        if std is None and frame.rig is None and (seen.touches_border or slid):
-            share = _BORDER_STD_SIZE if seen.touches_border else settings.centroid_std_size
-            std = math.hypot(settings.centroid_std, share * size, slid)
-        return Sighting(frame.T_base_cam, pose_cov, twist, seen.centroid, size, std)
+        sighting = sighting_of(frame.T_base_cam, twist, frame.segmentation, self._settings, slid)
+        if frame.rig is None:
+            return sighting
+        return replace(sighting, pose_cov=frame.rig.pose_cov, centroid_std=None)
+
+
+def sighting_of(
+    T_base_cam: FloatArray, twist: FloatArray, seen: Segmentation, settings: CalibratingSettings, slid: float = 0.0
+) -> Sighting:
+    """What a picture tells the calibrating filter.
+
+    Args:
+        T_base_cam: pose of the camera, shape (4, 4).
+        twist: its twist [v, w] in the camera frame, shape (6,); zeros where it rests or nobody knows.
+        seen: the target in the picture.
+        settings: with the noise.
+        slid: standard deviation of the slide of the centroid since the picture before, normalised coordinates.
+    """
+    pose_cov = np.diag(np.square([settings.position_std_m] * 3 + [settings.rotation_std_rad] * 3))
+    if not seen.visible:
+        return Sighting(T_base_cam, pose_cov, twist, None)
+    size, std = size_of(seen), seen.centroid_std
+    if std is None and (seen.touches_border or slid):
+        share = _BORDER_STD_SIZE if seen.touches_border else settings.centroid_std_size
+        std = math.hypot(settings.centroid_std, share * size, slid)
+    return Sighting(T_base_cam, pose_cov, twist, seen.centroid, size, std)

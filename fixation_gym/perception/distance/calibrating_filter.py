@@ -81,6 +81,12 @@ class CalibratingSettings:
         stds = [self.hand_eye_m] * 3 + [self.hand_eye_rad] * 3 + [self.image_age_s, self.focal]
         return np.maximum(stds, _EXACT)
 
+    def noise_of(self, sighting: Sighting) -> float:
+        """Standard deviation of a centroid, normalised coordinates."""
+        if sighting.centroid_std is not None:
+            return sighting.centroid_std
+        return math.hypot(self.centroid_std, self.centroid_std_size * sighting.image_std)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibratingState:
@@ -137,13 +143,13 @@ def advance(
     if state is None and not seen:
         return None
     if state is None:
-        state = _update(_first(sighting, settings), sighting, settings)
+        state = _update(first_state(sighting, settings), sighting, settings)
     else:
         state = _update(state, sighting, settings) if seen else walked(state, settings.lost_walk_m**2 * max(dt, 0.0))
     return replace(state, last_pose=sighting.T_base_cam) if np.all(np.isfinite(sighting.T_base_cam)) else state
 
 
-def _first(sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
+def first_state(sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
     """Anchor at the first sight, with priors; the direction is all but unknown until the update."""
     assert sighting.centroid is not None
     rho = 1.0 / settings.initial_distance_m
@@ -190,7 +196,7 @@ def noise_scale(state: CalibratingState, settings: CalibratingSettings) -> float
 def _update(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
     """Add a frame to the window and solve it again; outliers are rejected, and restart the filter when they persist."""
     scale = noise_scale(state, settings)
-    row = frame_row(state.T_base_anchor, sighting, _centroid_std(sighting, settings))[None]
+    row = frame_row(state.T_base_anchor, sighting, settings.noise_of(sighting))[None]
     innovation, jacobian, by_pose = innovations(state.mean, row)
     spread = jacobian[0] @ state.cov @ jacobian[0].T + scale * innovation_cov(row, by_pose)[0]
     nis = float(innovation[0] @ np.linalg.solve(spread, innovation[0]))
@@ -225,12 +231,6 @@ def _solved(state: CalibratingState, window: FloatArray, scale: float) -> Calibr
     return replace(state, mean=mean, cov=0.5 * (cov + cov.T), window=window, present=present)
 
 
-def _centroid_std(sighting: Sighting, settings: CalibratingSettings) -> float:
-    if sighting.centroid_std is not None:
-        return sighting.centroid_std
-    return math.hypot(settings.centroid_std, settings.centroid_std_size * sighting.image_std)
-
-
 def _restart(state: CalibratingState, sighting: Sighting, settings: CalibratingSettings) -> CalibratingState:
     """Begin again where the target is seen now, at the distance it had, or, if that was hardly known, the first guess.
 
@@ -255,7 +255,7 @@ def begun_again(
         std: its standard deviation, m.
         settings: prior and noise.
     """
-    fresh = _first(sighting, settings)
+    fresh = first_state(sighting, settings)
     mean, cov = fresh.mean.copy(), fresh.cov.copy()
     if depth is not None:
         mean[2] = rho = 1.0 / depth
