@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from fixation_gym.envs.depth_camera import FARTHEST_M
 from fixation_gym.envs.object_pool import SLOTS
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.scene import SceneSpec
@@ -49,6 +50,19 @@ def checked_frequency(frequency: Any) -> int:
     return int(frequency)
 
 
+def checked_depth_camera(depth_camera: Any, image_size: tuple[int, int] | None) -> bool:
+    """Return whether there is a depth camera.
+
+    Raises:
+        ValueError: if it is not said, or there is no image whose pixels it measures in.
+    """
+    if not isinstance(depth_camera, (bool, np.bool_)):
+        raise ValueError(f"depth_camera must be true or false, got {depth_camera!r}")
+    if depth_camera and image_size is None:
+        raise ValueError("depth_camera=True needs an image_size: it measures in the pixels of the wrist image")
+    return bool(depth_camera)
+
+
 def require_choice(name: str, value: Any, allowed: tuple[str | None, ...]) -> None:
     """Check an argument that has a few allowed values.
 
@@ -57,6 +71,18 @@ def require_choice(name: str, value: Any, allowed: tuple[str | None, ...]) -> No
     """
     if not (value is None or isinstance(value, str)) or value not in allowed:
         raise ValueError(f"{name} must be one of {', '.join(repr(choice) for choice in allowed)}, got {value!r}")
+
+
+def check_rendering(render_mode: Any, render_view: Any, image_size: tuple[int, int] | None) -> None:
+    """Check what ``render`` shall show.
+
+    Raises:
+        ValueError: for another value than those that are allowed, or an overlay on no image.
+    """
+    require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
+    require_choice("render_view", render_view, ("wrist", "front", "overlay"))
+    if image_size is None and render_view == "overlay":
+        raise ValueError('render_view="overlay" shows what perception sees, so it needs an image_size')
 
 
 def checked_scene(options: dict[str, Any] | None) -> SceneSpec | None:
@@ -100,7 +126,12 @@ def within(vectors: dict[str, Any], bounds: dict[str, tuple[FloatArray, FloatArr
     return {key: np.minimum(np.maximum(value, low), high).astype(np.float32) for key, value, low, high in pairs}
 
 
-def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
+def depth_space(image_size: tuple[int, int]) -> spaces.Box:
+    """Space of a depth camera's picture of (height, width) px; m, 0 where it says nothing."""
+    return spaces.Box(0.0, FARTHEST_M, image_size, np.float32)
+
+
+def observation_space(image_size: tuple[int, int] | None, depth_camera: bool = False) -> spaces.Dict:
     """Observation space of ``FixationPick-v0`` with a wrist image of that size, or without; units as in its table."""
 
     def box(*bounds: float) -> spaces.Box:
@@ -112,6 +143,8 @@ def observation_space(image_size: tuple[int, int] | None) -> spaces.Dict:
         height, width = image_size
         image["rgb"] = spaces.Box(0, 255, (height, width, 3), np.uint8)
         image["image_time"] = spaces.Box(-_LONGEST_DELAY, 3600.0, (1,), np.float32)
+        if depth_camera:
+            image["depth"] = depth_space(image_size)
         image["target_box"] = spaces.Box(0.0, np.array([width, height] * 2, np.float32), dtype=np.float32)
     return spaces.Dict(
         image

@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from fixation_gym.envs import arguments, config, rewards, sensors, wrist_camera
+from fixation_gym.envs.info import info_of
 from fixation_gym.envs.photoreal.engine import check_renderer
 from fixation_gym.envs.sampling import sample_scene
 from fixation_gym.envs.scene import SceneSpec
@@ -19,7 +20,6 @@ from fixation_gym.envs.sensor_noise import SensorNoise, resolve_sensor_noise
 from fixation_gym.envs.state import Resumable
 from fixation_gym.envs.target_box import target_box, target_sight
 from fixation_gym.envs.views import Views, overlay
-from fixation_gym.geometry.rigid import matrix_to_pose
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.rectification import undistorted
 from fixation_gym.robots import ROBOT
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
     from fixation_gym.envs.rendering import View
 
-RENDER_VIEWS = ("wrist", "front", "overlay")
+_NO_PICTURE, _NO_DEPTH = np.zeros((0, 0, 3), np.uint8), np.zeros((0, 0), np.float32)
 _EPISODE = ("scene", "percept", "camera_on", "_np_random", "_np_random_seed", "_noise_rng", "_errors", "_camera")
 _EPISODE += ("_steps", "_steps_lifted", "_collided", "_target_box", "_state", "_arm", "_observation")
-_EPISODE += ("_last_rgb", "_image_time")
+_EPISODE += ("_last_rgb", "_last_depth", "_depth_rng", "_image_time")
 """What changes in an episode beside the simulation."""
 
 
@@ -52,6 +52,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     | key | shape | meaning |
     |---|---|---|
     | ``rgb`` | (H, W, 3) uint8 | wrist image, top-left origin |
+    | ``depth`` | (H, W) | with ``depth_camera`` alone: what that says, along the optical axis, m; 0: nothing |
     | ``image_time`` | (1,) | when that was taken, by its stamp: ``time``, if the camera has no delay or clock |
     | ``joint_pos``, ``joint_vel`` | (7,) | arm joints, rad and rad/s |
     | ``gripper_width`` | (1,) | opening between the finger pads, m |
@@ -89,6 +90,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         reward: str = "dense",
         reward_weights: rewards.RewardWeights | Mapping[str, float] | None = None,
         renderer: str = "mujoco",
+        depth_camera: bool = False,
     ) -> None:
         """Check the arguments; the simulation itself is built at the first reset.
 
@@ -104,6 +106,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
             reward_weights: of the dense reward: ``rewards.RewardWeights``, or a mapping with some of them; None for the
                 defaults.
             renderer: of ``rgb``: "mujoco", or "mitsuba" with real glass and mirrors (extra ``photoreal``; slow).
+            depth_camera: whether observations have ``depth``, as a stereo camera would measure it (``depth_camera``).
 
         Raises:
             ValueError: for a value that is not allowed; the message says what is.
@@ -113,12 +116,11 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self.noise = resolve_sensor_noise(sensor_noise)
         self._image_size = arguments.checked_image_size(image_size)
         control_frequency = arguments.checked_frequency(control_frequency)
-        arguments.require_choice("render_mode", render_mode, (None, "rgb_array", "human"))
-        arguments.require_choice("render_view", render_view, RENDER_VIEWS)
-        if self._image_size is None and render_view == "overlay":
-            raise ValueError('render_view="overlay" shows what perception sees, so it needs an image_size')
+        arguments.check_rendering(render_mode, render_view, self._image_size)
         self.render_mode, self.render_view = render_mode, render_view
+        self._depth_camera = arguments.checked_depth_camera(depth_camera, self._image_size)
         self._arguments: dict[str, Any] = {
+            "depth_camera": self._depth_camera,
             "image_size": self._image_size,
             "sensor_noise": sensor_noise if isinstance(sensor_noise, str) else self.noise,
             "control_frequency": control_frequency,
@@ -131,14 +133,14 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self.hand_eye, self.control_frequency = ROBOT.camera.hand_eye, control_frequency
         self._reward_terms = rewards.choose_terms(reward, reward_weights)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
-        self.observation_space = arguments.observation_space(self._image_size)
+        self.observation_space = arguments.observation_space(self._image_size, self._depth_camera)
         self._limits = arguments.limits(self.observation_space)
         self._running, self._sim = False, cast("PickSim | None", None)
         self._views = Views(self.intrinsics, renderer)
         self.percept: Percept | None = None
         """What whoever acts perceived in the last observation, if it says so: drawn into the overlay."""
         self.scene: SceneSpec | None = None
-        self._last_rgb, self._image_time = np.zeros((0, 0, 3), np.uint8), 0.0
+        self._last_rgb, self._last_depth, self._image_time = _NO_PICTURE, _NO_DEPTH, 0.0
         self.camera_on = True
         """While False, steps render nothing, and the last image and percept stay: for training, in grasps."""
 
@@ -152,6 +154,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         super().reset(seed=seed)
         # Noise has a generator of its own: scenes depend on the seed alone, not on how long earlier episodes were.
         self._noise_rng = self.np_random.spawn(1)[0]
+        self._depth_rng = self._noise_rng.spawn(1)[0]
         self.scene = given or sample_scene(self.scenario, self.np_random)
         self._errors = sensors.draw_episode_errors(self.noise, self._noise_rng)
         self.sim.reset(self.scene)
@@ -269,23 +272,25 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         observation: dict[str, Any] = {}
         if self._image_size is not None:
             if self.camera_on and self._camera.stamp_s != self._image_time:
-                light, exposure = partial(self._views.light, self.sim, self._noise_rng), self._errors.exposure
-                self._last_rgb = wrist_camera.picture(self._camera, self.noise, exposure, light, self._noise_rng)
-                self._image_time = self._camera.stamp_s
+                self._take_picture()
             observation["rgb"] = self._last_rgb.copy()
+            if self._depth_camera:
+                observation["depth"] = self._last_depth.copy()
             observation["target_box"] = self._target_box.astype(np.float32)
-        joint_pos, joint_vel, pose, twist = sensors.measure_arm(state, self.noise, self._errors, self._noise_rng)
-        vectors: dict[str, Any] = {
-            "joint_pos": joint_pos,
-            "joint_vel": joint_vel,
-            "gripper_width": [state.gripper_width],
-            "camera_pose": matrix_to_pose(pose),
-            "camera_twist": twist,
-            "time": [self._steps / self.control_frequency],
-            **({} if self._image_size is None else {"image_time": [self._image_time]}),
-        }
+        vectors = sensors.arm_reading(state, self.noise, self._errors, self._noise_rng)
+        vectors["time"] = [self._steps / self.control_frequency]
+        if self._image_size is not None:
+            vectors["image_time"] = [self._image_time]
         self._observation = {**observation, **arguments.within(vectors, self._limits)}
         return self._observation
+
+    def _take_picture(self) -> None:
+        """Take over the newest picture, and depth in the middle of its exposure."""
+        light, exposure = partial(self._views.light, self.sim, self._noise_rng), self._errors.exposure
+        self._last_rgb = wrist_camera.picture(self._camera, self.noise, exposure, light, self._noise_rng)
+        self._image_time = self._camera.stamp_s
+        if self._depth_camera:
+            self._last_depth = self._views.depth(self.sim, self.noise, exposure, self._depth_rng, self.picture_qpos)
 
     def _task_state(self) -> rewards.TaskState:
         distance = math.dist(self.sim.body_position("target"), self.sim.tool_position())
@@ -293,14 +298,5 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         return rewards.TaskState(distance, self.sim.target_rise(), held, self._collided)
 
     def _info(self, terms: dict[str, float]) -> dict[str, Any]:
-        depth, offset = target_sight(self._arm.camera_pose, self.sim.body_position("target"), self.intrinsics)
-        # NumPy's scalars: some libraries ask every value for its dtype.
-        return {
-            "is_success": np.bool_(self._state.success),
-            "success": np.bool_(self._state.success),
-            "collision": np.bool_(self._state.collision),
-            "clearance_m": np.float64(self.sim.clearance()),
-            "distance_true_m": np.float64(depth),
-            "fixation_error_px": np.float64(offset),
-            "reward_terms": terms,
-        }
+        sight = target_sight(self._arm.camera_pose, self.sim.body_position("target"), self.intrinsics)
+        return info_of(self._state, self.sim.clearance(), sight, terms)

@@ -89,13 +89,21 @@ class View:
         """Lent to other pictures of the same size: a GL context of their own would copy all meshes and textures."""
         return self._renderer
 
-    def render(self, qpos: FloatArray, *, with_reflections: bool) -> ImageArray:
-        """Image of the configuration, shape (H, W, 3), top-left origin."""
+    def render(self, qpos: FloatArray, *, with_reflections: bool, right_m: float = 0.0) -> ImageArray:
+        """Image of the configuration, shape (H, W, 3), top-left origin.
+
+        Args:
+            qpos: of the model.
+            with_reflections: whether mirrors show any.
+            right_m: how far to the right of the camera it is taken, m.
+        """
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
         # Every scene has its own light; MuJoCo 4 computes once what does not move.
         self._data.light_xdir[self._fixed_lights] = self._model.light_dir[self._fixed_lights]
         mujoco.mj_camlight(self._model, self._data)
+        rightwards = self._data.cam_xmat[self._camera_id].reshape(3, 3)[:, 0]
+        self._data.cam_xpos[self._camera_id] += right_m * rightwards
         # The robot is behind its wrist camera; only a mirror shows it, where a coarse one does.
         self._option.geomgroup[scene_mjcf.ROBOT_GROUP] = int(self._full_quality)
         self._option.geomgroup[scene_mjcf.STAND_IN_GROUP] = int(with_reflections and not self._full_quality)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from fixation_gym.envs.sensor_noise import SensorNoise
-from fixation_gym.geometry.rigid import inverse
+from fixation_gym.geometry.rigid import inverse, matrix_to_pose
 from fixation_gym.geometry.twist import adjoint
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
@@ -84,6 +84,18 @@ def measure_arm(
     joint_pos = joint_pos + errors.joints
     pose = measure_camera_pose(arm.camera_pose, arm.jacobian, joint_pos - arm.joint_pos, errors.hand_eye)
     return joint_pos, joint_vel, pose, measure_camera_twist(arm.jacobian, joint_vel, errors)
+
+
+def arm_reading(arm: ArmState, noise: SensorNoise, errors: EpisodeErrors, rng: np.random.Generator) -> dict[str, Any]:
+    """What the observation says of the arm, by its keys there."""
+    joint_pos, joint_vel, pose, twist = measure_arm(arm, noise, errors, rng)
+    return {
+        "joint_pos": joint_pos,
+        "joint_vel": joint_vel,
+        "gripper_width": [arm.gripper_width],
+        "camera_pose": matrix_to_pose(pose),
+        "camera_twist": twist,
+    }
 
 
 def _small_rotation(vector: FloatArray) -> FloatArray:

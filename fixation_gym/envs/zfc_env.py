@@ -61,6 +61,7 @@ class FixationPickZFC(FixationPickEnv):
     | ``zfc_map`` ("zfc") | (1, 32, 32) float32 | P(nearer than the fixated object), 0..1; 128/255 = unknown |
     | nothing ("blind") | | |
     | ``rgb`` ("rgb") | (H, W, 3) uint8 | wrist image |
+    | ``depth`` ("depth") | (H, W) float32 | what a stereo depth camera says, m; 0: nothing (``depth_camera``) |
     | ``true_map`` ("privileged") | (1, 32, 32) float32 | share of the cell truly nearer than the object, 0..1 |
     | ``fixation`` | (5,) float32 | centroid x, y (normalised image coordinates), visible, distance m, its std m |
     | ``proprio`` | (24,) float32 | see below |
@@ -94,7 +95,7 @@ class FixationPickZFC(FixationPickEnv):
 
         Args:
             scenario: as in ``FixationPickEnv``, like all that follow but for two:
-            observation: "zfc", "blind", "rgb" or "privileged".
+            observation: "zfc", "blind", "rgb", "depth" or "privileged".
             image_size: (height, width) of the wrist image, px; may not be None, for perception works on it.
             sensor_noise: name from ``sensor_noise.SENSOR_NOISE`` or a mapping of ``SensorNoise`` fields.
             control_frequency: steps per second.
@@ -120,11 +121,13 @@ class FixationPickZFC(FixationPickEnv):
             reward,
             reward_weights,
             renderer,
+            depth_camera=observation == "depth",
         )
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = zfc_observation_space(observation, (self.intrinsics.height, self.intrinsics.width))
         self._shown = observation
         self._arguments["observation"] = observation
+        del self._arguments["depth_camera"]  # follows from that
         self._truth: ObstacleDepth | None = None
         self._fixator = Fixator(perception_for(self.scenario, self.intrinsics), _GAINS)
 
@@ -178,6 +181,8 @@ class FixationPickZFC(FixationPickEnv):
             observation["zfc_map"] = map_levels(percept.zfc.cells)
         elif self._shown == "rgb":
             observation["rgb"] = reading.rgb
+        elif self._shown == "depth":
+            observation["depth"] = sensed["depth"]
         elif self._shown == "privileged":
             observation["true_map"] = self._true_map(info["distance_true_m"])
         observation["fixation"] = fixation_vector(percept.fixation)

@@ -9,13 +9,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fixation_gym.control.open_loop import Stage
-from fixation_gym.envs.arguments import WIDEST
+from fixation_gym.envs.arguments import WIDEST, depth_space
 from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray, Observation
 
-OBSERVATIONS = ("zfc", "blind", "rgb", "privileged")
+OBSERVATIONS = ("zfc", "blind", "rgb", "depth", "privileged")
 """What the learner gets beside ``fixation`` and ``proprio``."""
 _STAGES = tuple(Stage)
 
@@ -35,6 +35,7 @@ def zfc_observation_space(observation: str, image_size: tuple[int, int]) -> spac
         "zfc": {"zfc_map": cells},
         "blind": {},
         "rgb": {"rgb": spaces.Box(0, 255, (*image_size, 3), np.uint8)},
+        "depth": {"depth": depth_space(image_size)},
         "privileged": {"true_map": cells},
     }
     return spaces.Dict({**views[observation], "fixation": _FIXATION, "proprio": _PROPRIO})

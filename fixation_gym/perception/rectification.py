@@ -25,6 +25,11 @@ def in_colour(image: ImageArray) -> ImageArray:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), np.uint8)
 
 
+def as_grey(image: ImageArray) -> ImageArray:
+    """An image in colour, shape (H, W, 3), uint8, as a grey one, shape (H, W)."""
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
+
+
 def undistorted(image: ImageArray, camera: Intrinsics) -> ImageArray:
     """A picture of a camera as its pinhole sees it; for many of them, keep a ``Rectification``."""
     return image if camera.lens is None else Rectification(camera).image(image)

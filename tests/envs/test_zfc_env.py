@@ -21,7 +21,7 @@ from fixation_gym.types import Observation
 pytestmark = pytest.mark.sim
 SMALL = (64, 80)
 STILL, TRIGGER = np.array([0, 0, 0, -1], np.float32), np.array([0, 0, 0, 1], np.float32)
-KEYS = {"zfc": {"zfc_map"}, "blind": set(), "rgb": {"rgb"}, "privileged": {"true_map"}}
+KEYS = {"zfc": {"zfc_map"}, "blind": set(), "rgb": {"rgb"}, "depth": {"depth"}, "privileged": {"true_map"}}
 STAGE = slice(20, 24)
 
 
@@ -124,7 +124,7 @@ def test_bad_actions_are_refused_with_what_is_allowed(opaque, action):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"observation": "sonar"}, "'zfc', 'blind', 'rgb', 'privileged'"),
+        ({"observation": "sonar"}, "'zfc', 'blind', 'rgb', 'depth', 'privileged'"),
         ({"image_size": None}, "needs an image_size"),
         ({"scenario": "fog"}, "clear, opaque"),
     ],

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fixation_gym.envs.zfc_observation import OBSERVATIONS, zfc_observation_space
-from fixation_policies.rl.inputs import busy, input_space, network_inputs, observation_name, remember
+from fixation_gym.envs.zfc_observation import zfc_observation_space
+from fixation_policies.rl.inputs import VIEWS, busy, input_space, network_inputs, observation_name, remember
 
 
 def zfc_obs(cells, stage=None):
@@ -54,7 +54,7 @@ def test_images_show_what_changed():
     assert set(view[3:].ravel()) == {20}
 
 
-@pytest.mark.parametrize("observation", OBSERVATIONS)
+@pytest.mark.parametrize("observation", VIEWS)
 def test_inputs_are_in_their_space_for_every_observation(observation):
     space = zfc_observation_space(observation, (64, 80))
     space.seed(0)
@@ -78,6 +78,6 @@ def test_busy_in_every_stage_and_only_there():
     assert all(busy(zfc_obs(128, stage)) for stage in range(4))
 
 
-@pytest.mark.parametrize("observation", OBSERVATIONS)
+@pytest.mark.parametrize("observation", VIEWS)
 def test_an_observation_is_known_by_its_space(observation):
     assert observation_name(zfc_observation_space(observation, (64, 80))) == observation

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fixation_gym.envs.photoreal.lighting import lights
+from fixation_gym.envs.photoreal.lighting import DOT_IRRADIANCE, dot_pattern, lights
 from fixation_gym.envs.photoreal.materials import Material, bsdf
 from fixation_gym.envs.photoreal.meshes import Mesh
 from fixation_gym.types import FloatArray
 
 _DEPTH, _SURE_DEPTH = 16, 4
 """Longest path of light, and up to where it surely goes on. Through a vessel and back it meets eight surfaces."""
+PROJECTOR = "dots"
+"""Name of the projector in a scene."""
 _NEAR = 0.005
 """Nearest thing that the camera shows, m."""
 
@@ -43,7 +45,12 @@ def camera(mitsuba: Any, T_world_cam: FloatArray, fovy: float, size: tuple[int, 
 
 
 def scene(
-    mitsuba: Any, sensor: dict[str, Any], shapes: Mapping[str, Any], direction: FloatArray, middle: FloatArray
+    mitsuba: Any,
+    sensor: dict[str, Any],
+    shapes: Mapping[str, Any],
+    direction: FloatArray,
+    middle: FloatArray,
+    projector: Mapping[str, Any] | None = None,
 ) -> Any:
     """The scene.
 
@@ -53,11 +60,34 @@ def scene(
         shapes: by the names that their parameters get.
         direction: in which the light shines, shape (3,), in world.
         middle: of the table top, shape (3,), in world, m.
+        projector: as from ``dots``, if there is one.
     """
     light = lights(direction, middle)
+    if projector is not None:
+        light[PROJECTOR] = projector
     light["panel"]["to_world"] = mitsuba.ScalarTransform4f(light["panel"]["to_world"])
     integrator = {"type": "path", "max_depth": _DEPTH, "rr_depth": _SURE_DEPTH}
     return mitsuba.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **light, **shapes})
+
+
+def dots(mitsuba: Any, T_world_projector: FloatArray, fovy: float, size: tuple[int, int]) -> dict[str, Any]:
+    """Description of a depth camera's projector of dots.
+
+    Args:
+        mitsuba: the module.
+        T_world_projector: its pose in Mitsuba's axes, shape (4, 4).
+        fovy: vertical angle that it fills, rad.
+        size: height and width of the imagers' pictures, px: the pattern has their form.
+    """
+    image = mitsuba.Bitmap(dot_pattern(*size))
+    return {
+        "type": "projector",
+        "irradiance": {"type": "bitmap", "bitmap": image, "raw": True},
+        "scale": DOT_IRRADIANCE,
+        "fov": math.degrees(fovy),
+        "fov_axis": "y",
+        "to_world": mitsuba.ScalarTransform4f(T_world_projector),
+    }
 
 
 def shape(mitsuba: Any, mesh: Mesh, material: Any) -> Any:

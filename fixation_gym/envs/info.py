@@ -1,0 +1,30 @@
+"""The ``info`` of the environments: how it goes, and true values, which never reach the observation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fixation_gym.envs.rewards import TaskState
+
+
+def info_of(state: TaskState, clearance: float, sight: tuple[float, float], terms: dict[str, float]) -> dict[str, Any]:
+    """The info of a step; its keys are those of the class's page.
+
+    Args:
+        state: of the task.
+        clearance: between robot and obstacles, m.
+        sight: depth of the target's centre, m, and its offset from the image centre, px.
+        terms: of the reward.
+    """
+    # NumPy's scalars: some libraries ask every value for its dtype.
+    return {
+        "is_success": np.bool_(state.success),
+        "success": np.bool_(state.success),
+        "collision": np.bool_(state.collision),
+        "clearance_m": np.float64(clearance),
+        "distance_true_m": np.float64(sight[0]),
+        "fixation_error_px": np.float64(sight[1]),
+        "reward_terms": terms,
+    }
