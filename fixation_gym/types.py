@@ -47,6 +47,9 @@ class Observation:
     """Pixels of the target, shape (H, W), where somebody else finds it."""
     image_time: float | None = None
     """When the image was taken, as its stamp says, s; None: at ``time``."""
+    depth: FloatArray | None = None
+    """What a depth camera measured with the image, along the optical axis, in the pixels of the pinhole, shape (H, W),
+    m; NaN where nothing. None without such a camera."""
 
     @classmethod
     def of_camera(
@@ -76,6 +79,9 @@ class Observation:
         rgb = np.asarray(obs["rgb"])
         if rgb.dtype != np.uint8 or rgb.ndim != 3 or rgb.shape[2] != 3:
             raise ValueError(f"observation rgb must be uint8 of shape (H, W, 3), got {rgb.dtype} of shape {rgb.shape}")
+        depth = np.asarray(obs["depth"]) if "depth" in obs else None
+        if depth is not None and (depth.dtype.kind not in "fiu" or depth.shape != rgb.shape[:2]):
+            raise ValueError(f"observation depth must be a number per pixel of rgb, shape {rgb.shape[:2]}")
         mask = np.asarray(obs["mask"]) if "mask" in obs else None
         if mask is not None and (mask.dtype.kind not in "bui" or mask.shape != rgb.shape[:2]):
             raise ValueError(f"observation mask must be true or false per pixel of rgb, shape {rgb.shape[:2]}")
@@ -86,6 +92,7 @@ class Observation:
             target_box=_numbers(obs, "target_box", 4) if "target_box" in obs else None,
             image_time=float(_numbers(obs, "image_time", 1)[0]) if "image_time" in obs else None,
             mask=None if mask is None else mask.astype(np.bool_),
+            depth=None if depth is None else np.where(depth > 0, depth, math.nan),
             **vectors,
         )
 

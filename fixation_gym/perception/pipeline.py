@@ -34,6 +34,7 @@ from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.rectification import Rectification, in_colour
 from fixation_gym.perception.scratch import Scratch
 from fixation_gym.perception.settings import PerceptionSettings
+from fixation_gym.perception.zero_flow.pictures import Pictures
 from fixation_gym.perception.zero_flow.zero_flow import (
     Gaze,
     ZeroFlow,
@@ -149,7 +150,7 @@ class Perception:
         segmentation = detected(self._detector, observation, expected, self._intrinsics)
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         twist = self._twist(observation, T_base_cam)
-        frame = Frame(observation.time, grey, T_base_cam, twist, segmentation)
+        frame = Frame(observation.time, grey, T_base_cam, twist, segmentation, depth=observation.depth)
         self._estimator.add_frame(frame)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
@@ -225,7 +226,15 @@ class Perception:
         self._estimator.add_flow(flow, (first, middle, last))
         fixated = inverse_distance(self._estimator, middle.T_base_cam)
         gaze = Gaze(twist, *fixated, middle.segmentation.mask, middle.T_base_cam)
-        return zero_flow_test(flow, gaze, self._settings.zero_flow, self._self_mask, self.support_height_m)
+        settings, pictures = self._settings.zero_flow, _pictures((first, middle, last))
+        return zero_flow_test(flow, gaze, settings, self._self_mask, self.support_height_m, pictures)
+
+
+def _pictures(frames: tuple[Frame, Frame, Frame]) -> Pictures:
+    """What front rules may look at of three frames."""
+    first, middle, last = frames
+    poses = first.T_base_cam, middle.T_base_cam, last.T_base_cam
+    return Pictures((first.grey, middle.grey, last.grey), poses, middle.depth)
 
 
 @lru_cache(maxsize=1)

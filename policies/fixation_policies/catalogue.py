@@ -94,6 +94,8 @@ def surroundings(name: str) -> Surroundings:
     Raises:
         UsageError: for a file that is no agent.
     """
+    if name in VARIANT_NAMES:
+        return Surroundings(arguments={"depth_camera": True} if servo_variant(name).depth_camera else {})
     if not name.endswith(AGENT_SUFFIX):
         return Surroundings()
     card = read_card(Path(name))

@@ -149,3 +149,17 @@ def test_bad_values_are_refused():
         gym.make("FixationPick-v0", image_size=None, depth_camera=True)
     with pytest.raises(ValueError, match="depth_camera must be true or false, got 'yes'"):
         gym.make("FixationPick-v0", depth_camera="yes")
+
+
+@pytest.mark.sim
+def test_policy_sees_the_depth_of_its_environment():
+    from fixation_policies.catalogue import make_policy, surroundings
+
+    name = "servo:depth"
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=(120, 160), **surroundings(name).arguments)
+    policy, observation = make_policy(name, env), env.reset(seed=1)[0]
+    policy.reset()
+    for _ in range(25):
+        observation = env.step(policy.act(observation))[0]
+    assert policy.percept.zfc.supported.mean() > 0.3
+    env.close()

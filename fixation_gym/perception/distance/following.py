@@ -53,6 +53,8 @@ class Frame:
     """Target in the image."""
     rig: RigMeasurement | None = None
     """What a rig knows besides; None on a robot."""
+    depth: FloatArray | None = None
+    """What a depth camera says, any size of the same view, m; None without one."""
 
 
 def follow_poses(

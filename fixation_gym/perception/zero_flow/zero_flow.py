@@ -23,6 +23,7 @@ from fixation_gym.geometry.interaction import epipolar_direction
 from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.scratch import Float32Array, fill
 from fixation_gym.perception.zero_flow.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
+from fixation_gym.perception.zero_flow.pictures import Pictures
 from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQuestion
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
@@ -90,6 +91,7 @@ def zero_flow_test(
     settings: ZeroFlowSettings,
     self_mask: MaskArray | None = None,
     support_height_m: float | None = None,
+    pictures: Pictures | None = None,
 ) -> ZeroFlow:
     """Test every pixel of a flow against the fixated object and the support surface.
 
@@ -99,6 +101,7 @@ def zero_flow_test(
         settings: margins and gates.
         self_mask: pixels of the robot itself, any shape (H, W); they are unknown.
         support_height_m: height of the horizontal support surface in base, m; None if there is none.
+        pictures: that the flow was made of, for rules that look at them.
     """
     shape = flow.overlap.shape
     if not flow.valid or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
@@ -107,7 +110,8 @@ def zero_flow_test(
     if self_mask is not None:
         usable &= ~widened_on_grid(self_mask, shape, 1)
     question = _question(flow, gaze, settings, support_height_m)
-    answers = settings.rule(flow, usable, question, gaze.twist, gaze.inverse_distance, settings.depth_margin)
+    fixated, margin = gaze.inverse_distance, settings.depth_margin
+    answers = settings.rule(flow, usable, question, gaze.twist, fixated, margin, pictures)
     if gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance or flow.imperfect:
         _leave_the_decided(answers)
     outline = _outline(answers, gaze.inverse_distance, settings)

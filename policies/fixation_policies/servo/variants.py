@@ -14,6 +14,7 @@ from fixation_gym.perception.detection.detector import Detector
 from fixation_gym.perception.detection.mean_shift import MeanShiftDetector
 from fixation_gym.perception.distance.estimator import DistanceEstimator, TwistEstimator
 from fixation_gym.perception.settings import PerceptionSettings
+from fixation_gym.perception.zero_flow.depth_rules import depth_rule, motion_stereo, plane_parallax
 from fixation_gym.perception.zero_flow.evidence_map import ZeroFlowSettings
 from fixation_gym.perception.zero_flow.front_rule import dot_product_rule
 from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings
@@ -37,6 +38,8 @@ class ServoVariant:
     """Makes what tells its distance; None: poses and centroids."""
     avoid_obstacles: bool = True
     """False takes its map away: it comes in along its first line of sight."""
+    depth_camera: bool = False
+    """Whether it needs one."""
 
 
 VARIANTS: tuple[ServoVariant, ...] = (
@@ -67,6 +70,22 @@ VARIANTS: tuple[ServoVariant, ...] = (
         "servo:dot_product",
         "the exact zero-flow test: the paper's dot-product rule tells front from behind",
         perception=PerceptionSettings(zero_flow=ZeroFlowSettings(rule=dot_product_rule)),
+    ),
+    ServoVariant(
+        "servo:depth",
+        "the zero-flow test: a stereo depth camera tells what is nearer",
+        perception=PerceptionSettings(zero_flow=ZeroFlowSettings(rule=depth_rule)),
+        depth_camera=True,
+    ),
+    ServoVariant(
+        "servo:motion_stereo",
+        "the zero-flow test: dense flow, triangulated with the known poses, tells what is nearer",
+        perception=PerceptionSettings(zero_flow=ZeroFlowSettings(rule=motion_stereo)),
+    ),
+    ServoVariant(
+        "servo:plane_parallax",
+        "the zero-flow test: whatever moves unlike the table is in the way",
+        perception=PerceptionSettings(zero_flow=ZeroFlowSettings(rule=plane_parallax)),
     ),
     ServoVariant(
         "servo:hard_filter",
