@@ -19,6 +19,7 @@ from fixation_gym.experiments.scenarios.scenes import (
     CIRCLE_RADIUS,
     CIRCLE_RATE,
     CLEAR,
+    MATERIAL_SCENES,
     SCENES,
     VARIANTS,
     Instance,
@@ -46,7 +47,8 @@ def asked(instance: Instance) -> tuple[ObstacleSpec, ...]:
 
 @pytest.mark.parametrize(
     ("scene", "variant"),
-    [(scene, variant) for scene in SCENES[:3] for variant in VARIANTS] + [("reflection", "border")],
+    [(scene, variant) for scene in SCENES[:3] for variant in VARIANTS]
+    + [("reflection", "border"), ("glass", "lateral"), ("chrome", "lateral")],
 )
 def test_every_instance_shows_what_its_scene_promises(scene, variant):
     instance = sample_instance(scene, variant, np.random.default_rng(7))
@@ -56,6 +58,8 @@ def test_every_instance_shows_what_its_scene_promises(scene, variant):
         "see_through": ["translucent", "opaque"],
         "mirror": ["mirror", "opaque", "opaque", "opaque"],
         "reflection": ["mirror", "opaque"],
+        "glass": ["glass", "opaque"],
+        "chrome": ["chrome", "chrome", "opaque", "opaque"],
     }
     assert [obstacle.kind for obstacle in obstacles] == expected[scene]
     depths = [view.sight(obstacle).depths for obstacle in obstacles]
@@ -221,10 +225,33 @@ def test_instances_differ_by_seed_scene_and_variant():
     assert ScenariosConfig().repetitions == 20
 
 
+def test_mitsuba_adds_glass_and_chrome_and_leaves_the_clear_scene_out():
+    cells = ScenariosConfig(count=2, variants=("lateral",), renderer="mitsuba").cells()
+    scenes = {scene for scene, _, _ in cells}
+    assert scenes == {*SCENES, *MATERIAL_SCENES}
+    assert len(cells) == 2 * len(scenes)
+    assert {cell["renderer"] for cell in cells.values()} == {"mitsuba"}
+    plain = ScenariosConfig(count=2).cells()
+    shared = {key: instance_rng(cell).random() for key, cell in cells.items() if key in plain}
+    assert shared == {key: instance_rng(plain[key]).random() for key in shared}  # the same instances by both renderers
+
+
+def test_surfaces_in_front_are_counted_whatever_is_seen_in_them():
+    counts = {"right": 1, "asked": 1, "front_curved_mirror": 10, "front_curved_mirror_called": 9}
+    run = {"scene": "chrome", "variant": "lateral", "rules": dict.fromkeys(RULES, counts), "objects": []}
+    run |= {"unknown": 0, "pixels": 1, "falsely_moving": 0, "distance_error": 0.01}
+    rows = summarise([run])["scenes"]["chrome"]
+    assert {row["variant"] for row in rows} == {"lateral", "all"}
+    assert rows[0]["curved_mirror_called_front"] == pytest.approx(0.9)
+    assert rows[0]["flat_mirror_called_front"] is None
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"noise": "loud"}, "nominal"),
+        ({"variants": ("sideways",)}, "lateral, approach"),
+        ({"renderer": "blender"}, "mujoco, mitsuba"),
         ({"seed": -1}, "--seed must be 0 or more"),
         ({"count": 0}, "--instances must be within"),
         ({"workers": 0}, "--workers must be at least 1"),

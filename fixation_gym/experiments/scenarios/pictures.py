@@ -22,6 +22,8 @@ TITLES = {
     "see_through": "see-through, in the line of sight",
     "mirror": "mirror in front",
     "reflection": "reflection of an obstacle",
+    "glass": "what bends light, in the line of sight",
+    "chrome": "curved mirrors in front",
 }
 _PICTURE_S = 1.3
 """Time of the pictures in the figure, s."""

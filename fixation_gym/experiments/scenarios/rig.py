@@ -11,6 +11,7 @@ import numpy as np
 from fixation_gym.control.servo_laws import gaze_rotation, roll_rate
 from fixation_gym.envs import sensors
 from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE
+from fixation_gym.envs.photoreal.view import PhotorealView
 from fixation_gym.envs.pick_sim import PickSim
 from fixation_gym.envs.rendering import View
 from fixation_gym.envs.scene import ObstacleSpec
@@ -54,10 +55,12 @@ class Look:
 class ScenarioRig:
     """Simulation, wrist camera, sensors and perception. Owns GL contexts."""
 
-    def __init__(self, noise: SensorNoise) -> None:
-        """Compile the model."""
+    def __init__(self, noise: SensorNoise, renderer: str = "mujoco") -> None:
+        """Compile the model; ``renderer`` makes the pictures that perception sees."""
         self._noise = noise
         self.sim = PickSim(CONTROL_FREQUENCY)
+        self._photoreal = PhotorealView(self.sim.model, INTRINSICS) if renderer == "mitsuba" else None
+        self._pictures = 0
         self._view = View(self.sim.model, CAMERA_NAME, *IMAGE_SIZE, full_quality=False)
         self.perception = Perception(INTRINSICS, support_height_m=ROBOT.workspace.table_height)
         self._truth = TruthView(self.sim.model, self.perception.flow_intrinsics)
@@ -84,7 +87,8 @@ class ScenarioRig:
                 continue
             if self.sim.clearance() < _ARM_ROOM:
                 continue
-            seen = segment(self._image(self.sim.data.qpos), INTRINSICS)
+            shown = self._view.render(self.sim.data.qpos, with_reflections=self._mirror)
+            seen = segment(shown, INTRINSICS)  # by MuJoCo always: equal seeds give equal instances
             if seen.visible and seen.area_fraction > _LEAST_AREA and np.linalg.norm(seen.centroid) < 0.06:
                 return instance
         raise RuntimeError(f"no instance of scene {scene!r}, variant {variant!r} that the arm can look at")
@@ -104,8 +108,15 @@ class ScenarioRig:
             model.geom_contype[model.geom_bodyid == body] = model.geom_conaffinity[model.geom_bodyid == body] = 0
             self.sim.data.xfrc_applied[body, :3] = -model.body_mass[body] * model.opt.gravity
         self.sim.step(np.zeros(6), -1.0)
+        if self._photoreal is not None:
+            self._photoreal.load()
+            self._pictures = 0
 
     def _image(self, qpos: FloatArray) -> ImageArray:
+        """What the camera sees of a configuration, shape (H, W, 3)."""
+        if self._photoreal is not None:
+            self._pictures += 1  # its rays get another seed in every picture
+            return self._photoreal.render(qpos, seed=self._pictures)
         return self._view.render(qpos, with_reflections=self._mirror)
 
     def run(self, instance: Instance, rng: np.random.Generator) -> Iterator[Look]:

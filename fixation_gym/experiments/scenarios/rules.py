@@ -13,6 +13,9 @@ RULES: tuple[Rule, ...] = ("plane", "behind", "paper", "exact")
 lateral velocity; the residual along the epipolar line. The first two use no motion: what they get right is what the
 instances give away."""
 
+SURFACES = ("see_through", "curved_mirror", "flat_mirror")
+"""Surfaces in which something else is seen."""
+
 
 def plane_front(
     T_base_cam: FloatArray, intrinsics: Intrinsics, table_height: float, inverse_distance: float

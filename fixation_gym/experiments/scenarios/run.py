@@ -13,14 +13,14 @@ from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.workers import kept, prepare_process
 from fixation_gym.experiments.runner import Cell, Experiment
 from fixation_gym.experiments.scenarios.config import Key, ScenariosConfig
-from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
+from fixation_gym.experiments.scenarios.scenes import CLEAR, MATERIAL_SCENES, SCENES, VARIANTS
 from fixation_gym.experiments.scenarios.statistics import rows_of, summarise
 
 if TYPE_CHECKING:
     from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
 RUNS_FILE, CSV_FILE, FIGURE_FILE = "runs.jsonl", "rows.csv", "scenarios.png"
-VIDEO_FILES = {scene: f"{scene}.mp4" for scene in SCENES}
+VIDEO_FILES = {scene: f"{scene}.mp4" for scene in (*SCENES, *MATERIAL_SCENES)}
 
 
 def cell_key(cell: Cell) -> Key:
@@ -41,22 +41,22 @@ EXPERIMENT = Experiment(
 
 def instance_rng(cell: Cell) -> np.random.Generator:
     """The generator of an instance and of its noise."""
-    scene = (*SCENES, CLEAR).index(cell["scene"])
+    scene = (*SCENES, CLEAR, *MATERIAL_SCENES).index(cell["scene"])
     return np.random.default_rng([cell["seed"], scene, VARIANTS.index(cell["variant"]), 4])
 
 
-def rig_for(noise: str) -> ScenarioRig:
-    """The rig of this process with some sensor noise."""
+def rig_for(noise: str, renderer: str) -> ScenarioRig:
+    """The rig of this process with some sensor noise, whose pictures somebody makes."""
     prepare_process()
     from fixation_gym.envs.sensor_noise import SENSOR_NOISE
     from fixation_gym.experiments.scenarios.rig import ScenarioRig
 
-    return kept(ScenarioRig, SENSOR_NOISE[noise], close=ScenarioRig.close)
+    return kept(ScenarioRig, SENSOR_NOISE[noise], renderer, close=ScenarioRig.close)
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
     """Look at the instance of a cell; returns the cell with its scores."""
-    rig = rig_for(cell["noise"])
+    rig = rig_for(cell["noise"], cell["renderer"])
     from fixation_gym.experiments.scenarios.scoring_run import run_clear, run_scene
 
     rng = instance_rng(cell)
@@ -80,6 +80,8 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
         UsageError: if the folder cannot be used.
     """
     cells, settings = config.cells(), {"seed": config.seed, "noise": config.noise}
+    if config.renderer != "mujoco":
+        settings["renderer"] = config.renderer
     with EXPERIMENT.opened(out, settings, run, config.workers) as folder:
         statistics = summarise(folder.results(cells.values()))
         about = {"quick": config.quick, "instances": config.repetitions, "runs_resumed": folder.resumed}
@@ -88,8 +90,9 @@ def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, 
         if config.film:
             from fixation_gym.experiments.scenarios.pictures import film
 
-            examples = {scene: cells[scene, VARIANTS[0], config.seed * SEED_BLOCK] for scene in SCENES}
-            videos = {scene: out / name for scene, name in VIDEO_FILES.items()}
+            seed = config.seed * SEED_BLOCK
+            examples = {scene: {"scene": scene, "variant": VARIANTS[0], "seed": seed} for scene in config.scenes}
+            videos = {scene: out / VIDEO_FILES[scene] for scene in config.scenes}
             generators = {scene: instance_rng(cell) for scene, cell in examples.items()}
-            film(rig_for(config.noise), generators, videos, out / FIGURE_FILE)
+            film(rig_for(config.noise, config.renderer), generators, videos, out / FIGURE_FILE)
     return summary

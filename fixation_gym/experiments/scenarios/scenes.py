@@ -34,6 +34,8 @@ from fixation_gym.types import FloatArray
 SCENES = ("opaque", "see_through", "mirror", "reflection")
 """Things in front and behind; a see-through thing across the line of sight; a mirror in front; an object whose
 reflection appears in front."""
+MATERIAL_SCENES = ("glass", "chrome")
+"""The second with real glass, and the first with curved mirrors in front: for physically based pictures."""
 VARIANTS = ("lateral", "approach", "border", "plain", "moving")
 """Lateral motion; forward as fast as lateral; obstacles at the image border; untextured obstacles (see-through ones
 without rim and label); one obstacle that moves by itself."""
@@ -90,7 +92,7 @@ class Instance:
 
 
 def sample_instance(scene: str, variant: str, rng: np.random.Generator) -> Instance:
-    """Draw an instance of one of ``SCENES`` or ``CLEAR`` in one of ``VARIANTS``.
+    """Draw an instance of one of ``SCENES``, ``MATERIAL_SCENES`` or ``CLEAR`` in one of ``VARIANTS``.
 
     Raises:
         RuntimeError: if none is found.

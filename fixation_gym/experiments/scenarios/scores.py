@@ -3,8 +3,10 @@
 Pixels are asked "nearer than the fixated object?", the table included, as the paper's rule knows no table. A pixel
 counts if its true depth differs from Z_f by more than 10 % and what it shows is one thing that stands still: not where
 see-through things show something on the other side, not the robot in a mirror, nothing that moves. On a mirror's face
-the truth is the virtual image. Obstacles count with their surface; see-through things and mirrors are obstacles, and
-so is the stand under the fixated object, about which no vote is held. All rules are asked at the same pixels.
+the truth is the virtual image; curved mirrors, whose images have no one place, do not count. Of see-through things and
+mirrors in front it is also counted how many of their pixels are called in front, whatever is seen in them. Obstacles
+count with their surface; see-through things and mirrors are obstacles, and so is the stand under the fixated object,
+about which no vote is held. All rules are asked at the same pixels.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy as np
 
 from fixation_gym.envs.truth_view import Truth
 from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
-from fixation_gym.experiments.scenarios.rules import Rule, plane_front
+from fixation_gym.experiments.scenarios.rules import SURFACES, Rule, plane_front
 from fixation_gym.experiments.scenarios.scenes import Instance
 from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front
 from fixation_gym.perception.zero_flow.region_vote import VoteSettings, region_votes
@@ -25,6 +27,7 @@ from fixation_gym.types import FloatArray, MaskArray
 
 PLACES = ("obstacle", "table", "room")
 """What pixels show, by what stands there; a mirror is an obstacle, whatever it shows."""
+_CURVED = ("chrome", "brushed")
 DEPTH_MARGIN = 0.10
 INNER_PX = 3
 """Inner pixels are farther than this from depth edges, px of the flow grid: 6 px of the frames that flow is made of."""
@@ -45,6 +48,8 @@ class PixelTruth:
     """Virtual images of static things that lie clearly behind the fixated object."""
     image_of_obstacle: MaskArray
     """Those of obstacles."""
+    surfaces: dict[str, MaskArray]
+    """Pixels of each of ``SURFACES`` that is clearly in front itself, whatever is seen in it."""
     places: dict[str, MaskArray]
     """Pixels of each of ``PLACES``."""
     regions: dict[int, MaskArray]
@@ -64,7 +69,10 @@ def pixel_truth(rig: ScenarioRig, instance: Instance, truth: Truth, target_depth
     if instance.mover is not None:
         moving = rig.sim.obstacles[instance.mover]
         excluded |= (owner == moving) | (image_owner == moving)
+    surfaces = _surfaces(rig, truth, on_mirror)
+    excluded |= surfaces["curved_mirror"]  # what is seen there has a place of its own for every direction of motion
     side[excluded] = 0.0
+    ahead = _side(truth.depth, target_depth) > 0.0
     edges = _edges(depth) | _edges(truth.depth)
     near_edge = cv2.dilate(edges.astype(np.uint8), np.ones((2 * INNER_PX + 1, 2 * INNER_PX + 1), np.uint8))
     image = on_mirror & (side < 0.0)
@@ -74,9 +82,19 @@ def pixel_truth(rig: ScenarioRig, instance: Instance, truth: Truth, target_depth
         inner=near_edge == 0,
         image=image,
         image_of_obstacle=image & np.char.startswith(image_owner, "obstacle"),
+        surfaces={name: mask & ahead for name, mask in surfaces.items()},
         places=dict(zip(PLACES, (on_obstacle, on_table, ~on_obstacle & ~on_table), strict=True)),
         regions={index: np.isin(truth.geom, geoms) for index, geoms in enumerate(rig.thing_geoms)},
     )
+
+
+def _surfaces(rig: ScenarioRig, truth: Truth, on_mirror: MaskArray) -> dict[str, MaskArray]:
+    """Pixels whose first surface is one of ``SURFACES``."""
+    model = rig.sim.model
+    names = [model.mat(index).name if index >= 0 else "" for index in model.geom_matid.tolist()]
+    curved = np.isin(np.array([*names, ""])[truth.geom], _CURVED)
+    clear = np.append(model.geom_rgba[:, 3] < 1.0, False)[truth.geom] & ~curved & ~on_mirror
+    return dict(zip(SURFACES, (clear, curved, on_mirror), strict=True))
 
 
 def _side(depth: FloatArray, target_depth: float) -> FloatArray:
@@ -114,7 +132,8 @@ def calls(look: Look) -> dict[Rule, MaskArray]:
 
 def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
     """Counts per rule; ratios of their sums are the measures."""
-    asked = look.percept.zfc.supported & (truth.side != 0.0)
+    supported = look.percept.zfc.supported
+    asked = supported & (truth.side != 0.0)
     front = truth.side > 0.0
     result: dict[str, dict[str, int]] = {}
     for rule, called in calls(look).items():
@@ -142,6 +161,8 @@ def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
             "image_of_obstacle": count(asked & truth.image_of_obstacle),
             "image_of_obstacle_behind": count(asked & truth.image_of_obstacle & ~called),
             "pixels": count(truth.side != 0.0),
+            **{f"front_{name}": count(supported & mask) for name, mask in truth.surfaces.items()},
+            **{f"front_{name}_called": count(supported & mask & called) for name, mask in truth.surfaces.items()},
             **{f"on_{place}": count(asked & mask) for place, mask in truth.places.items()},
             **{f"on_{place}_right": count(asked & mask & right) for place, mask in truth.places.items()},
         }

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.evaluation.statistics import mean, median, wilson_interval
-from fixation_gym.experiments.scenarios.rules import RULES
-from fixation_gym.experiments.scenarios.scenes import CLEAR, SCENES, VARIANTS
+from fixation_gym.experiments.scenarios.rules import RULES, SURFACES
+from fixation_gym.experiments.scenarios.scenes import CLEAR, MATERIAL_SCENES, SCENES, VARIANTS
 
 Run = Mapping[str, Any]
 MEASURES = {
@@ -25,9 +25,10 @@ MEASURES = {
     "image_behind": ("image_behind", "image"),
     "inner_image_behind": ("inner_image_behind", "inner_image"),
     "obstacle_share": ("on_obstacle", "asked"),
+    **{f"{name}_called_front": (f"front_{name}_called", f"front_{name}") for name in SURFACES},
 }
 """Ratios of pixel counts summed over the instances; pixels without evidence do not count. ``surface``: of obstacles,
-but for images in mirrors."""
+but for images in mirrors. ``called_front``: of the pixels of a surface in front, whatever is seen in it."""
 FIRST_CALL_S = 0.5
 _RESAMPLES = 1000
 ALL = "all"
@@ -45,6 +46,8 @@ OBJECT_GROUPS: dict[str, Callable[[Mapping[str, Any]], bool]] = {
         o["kind"] == "translucent" and not o["trimmed"] and 0.5 <= o["alpha"] < 0.7
     ),
     "see-through, alpha < 0.5, bare": lambda o: o["kind"] == "translucent" and not o["trimmed"] and o["alpha"] < 0.5,
+    "real glass": lambda o: o["kind"] == "glass" and o["side"] == "front",
+    "curved mirror": lambda o: o["kind"] == "chrome" and o["side"] == "front",
     "framed mirror": lambda o: o["kind"] == "mirror",
     "moves by itself, in front": lambda o: o["moves"] and o["side"] == "front",
 }
@@ -55,11 +58,14 @@ def summarise(runs: Sequence[Run]) -> dict[str, Any]:
     """Rows per scene and over all, votes per kind of obstacle, and false alarms, JSON-able."""
     scored = [run for run in runs if run["scene"] != CLEAR]
     scenes = {}
-    for scene in SCENES:
+    variants = [variant for variant in VARIANTS if any(run["variant"] == variant for run in scored)]
+    for scene in (*SCENES, *MATERIAL_SCENES):
         here = [run for run in scored if run["scene"] == scene]
+        if not here:
+            continue
         scenes[scene] = [
             _row(variant, [run for run in here if variant in (run["variant"], ALL)], rule)
-            for variant in (*VARIANTS, ALL)
+            for variant in (*variants, ALL)
             for rule in RULES
         ]
     scenes[ALL] = [_row(ALL, scored, rule) for rule in RULES]
@@ -192,10 +198,11 @@ def format_table(summary: Mapping[str, Any]) -> str:
             votes = f"{row['vote_accuracy']:.2f} [{low:.2f}, {high:.2f}]"
             lines.append(f"{row['group']:48}{row['rule']:8}  {votes}  {called};  {first}")
     clear = summary["clear"]
-    lines.append(
-        f"\nclear: {clear['minutes']:.1f} min, {clear['map_alarms']} false alarms in the map, "
-        f"{clear['path_alarms']} that change the path"
-    )
+    if clear["minutes"]:
+        lines.append(
+            f"\nclear: {clear['minutes']:.1f} min, {clear['map_alarms']} false alarms in the map, "
+            f"{clear['path_alarms']} that change the path"
+        )
     return "\n".join(lines)
 
 

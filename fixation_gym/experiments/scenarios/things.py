@@ -46,6 +46,8 @@ _TARGET_ROOM = 0.045
 _POLE, _FOOT_NEARNESS = (0.42, 0.66), 0.76
 """Range of the normalised column of the foot of a gallows, and the largest depth of one in front, relative to the
 target's."""
+_CLEAR = ("translucent", "glass")
+"""Kinds that the target is seen through."""
 _LEAST_SIGHT = 7
 """Lines of sight that meet a thing; fewer are too little of it to be asked about."""
 _TOLD, _NOT_TOLD = 0.15, 0.03
@@ -175,7 +177,7 @@ def fulfils(view: SceneView, wish: Wish, obstacle: ObstacleSpec) -> bool:
         return False
     if wish.across and not view.is_across(obstacle):
         return False
-    if wish.in_front and hides(view, sight if wish.kind != "translucent" else _holder_sight(view, obstacle)):
+    if wish.in_front and hides(view, sight if wish.kind not in _CLEAR else _holder_sight(view, obstacle)):
         return False
     if not wish.in_front or wish.told is None:
         return True

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fixation_gym.experiments.scenarios.things import Wish
@@ -37,6 +39,18 @@ def _see_through_scene(variant: str, rise: float, rng: np.random.Generator) -> l
         across=not border,
     )
     return [glass, _solid(variant, rise, False, -sign, rng)]
+
+
+def _glass_scene(variant: str, rise: float, rng: np.random.Generator) -> list[Wish]:
+    """The same with what bends light: a tumbler, a bottle of water, a ball or a slab."""
+    glass, solid = _see_through_scene(variant, rise, rng)
+    return [replace(glass, kind="glass"), solid]
+
+
+def _chrome_scene(variant: str, rise: float, rng: np.random.Generator) -> list[Wish]:
+    """Two posts or balls of chrome or brushed metal in front, one on each side, and two solid things behind."""
+    first, second, *behind = _opaque_scene(variant, rise, rng)
+    return [replace(first, kind="chrome"), replace(second, kind="chrome"), *behind]
 
 
 def _mirror_scene(variant: str, rise: float, rng: np.random.Generator) -> list[Wish]:
@@ -88,5 +102,7 @@ WISHES = {
     "see_through": _see_through_scene,
     "mirror": _mirror_scene,
     "reflection": _reflection_scene,
+    "glass": _glass_scene,
+    "chrome": _chrome_scene,
 }
 """Wishes by scene, for a variant, the height of the stand under the target in m, and a generator."""
