@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from fixation_gym.envs.config import EPISODE_SECONDS
+from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.gl import select_backend
 from fixation_gym.replay.config import ReplayConfig
@@ -16,6 +18,18 @@ class Record(EvaluationConfig):
 
     out: Path = Path("out/record")
     """Folder of the recordings."""
+    seconds: float | None = None
+    """Length of the recordings, from the beginning of the episodes, s; by default to their ends."""
+
+    def check(self) -> None:
+        """Check everything that can be checked without building an environment.
+
+        Raises:
+            UsageError: naming the first bad value and what is allowed.
+        """
+        super().check()
+        if self.seconds is not None and not 0.0 < self.seconds <= EPISODE_SECONDS:
+            raise UsageError(f"--seconds must be above 0 and at most {EPISODE_SECONDS:g}, got {self.seconds}")
 
     def run(self) -> int:
         """Record and say where."""
@@ -23,7 +37,7 @@ class Record(EvaluationConfig):
         select_backend()
         from fixation_gym.recordings.record import record
 
-        summary = record(self, self.out)
+        summary = record(self, self.out, self.seconds)
         print(f"{summary['pictures']} pictures\n\n" + "\n".join(str(self.out / name) for name in summary["recordings"]))
         return 0
 

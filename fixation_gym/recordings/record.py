@@ -29,7 +29,7 @@ from fixation_gym.types import FloatArray, MaskArray, Observation
 
 @dataclass(frozen=True)
 class RecordedEpisode:
-    """An episode that is in the folder."""
+    """An episode, or its beginning, that is in the folder; how it went is as of the last picture."""
 
     scenario: str
     seed: int
@@ -45,12 +45,13 @@ class RecordedEpisode:
         return self.scenario, self.seed
 
 
-def record(config: EvaluationConfig, out: Path) -> dict[str, Any]:
+def record(config: EvaluationConfig, out: Path, seconds: float | None = None) -> dict[str, Any]:
     """Record the episodes that a folder does not have yet, each in a folder of its own.
 
     Args:
         config: must have passed ``check``.
         out: folder; made if needed. The same call again resumes, and more episodes come after.
+        seconds: length of the recordings, from the beginning of the episodes; None: to their ends.
 
     Returns:
         The summary, as in ``summary.json``.
@@ -59,13 +60,15 @@ def record(config: EvaluationConfig, out: Path) -> dict[str, Any]:
         UsageError: if the folder cannot be used, or holds another run.
     """
     description = {"command": "record", **config.run_description()}
+    if seconds is not None:
+        description["seconds"] = seconds
     cells = {key: config.cell(key) for key in config.episode_keys()}
     store = ResultStore(out, description, EPISODES_FILE, lambda episode: episode.key, _from_json, asdict)
     with store:
         resumed = run_missing(
             store,
             cells,
-            partial(_record_episode, out.resolve()),
+            partial(_record_episode, out.resolve(), math.inf if seconds is None else seconds),
             parse=_from_json,
             note=lambda episode: episode.folder,
             unit="episode",
@@ -89,8 +92,8 @@ def _from_json(values: Mapping[str, Any]) -> RecordedEpisode:
     return RecordedEpisode(**values)
 
 
-def _record_episode(out: Path, cell: workers.Cell) -> dict[str, Any]:
-    """Run and record the episode of a cell, in a worker process if there are several."""
+def _record_episode(out: Path, seconds: float, cell: workers.Cell) -> dict[str, Any]:
+    """Run and record the first seconds of a cell's episode, in a worker process if there are several."""
     from fixation_gym.envs.truth_view import TruthView
 
     env, policy = workers.world(cell)
@@ -104,7 +107,7 @@ def _record_episode(out: Path, cell: workers.Cell) -> dict[str, Any]:
     notes = {
         "source": f"fixation-gym, scenario {scenario}, seed {seed}, policy {cell['policy']}",
         "poses": f"forward kinematics with sensor noise '{cell['sensor_noise']}'",
-        "truth": "rendered depth, its median over the target's pixels",
+        "truth": "rendered depth of the first surface, glass and mirrors too; its median over the target's pixels",
     }
     count, last, done = 0, -math.inf, False
     with (
@@ -123,7 +126,7 @@ def _record_episode(out: Path, cell: workers.Cell) -> dict[str, Any]:
                 writer.add(stamp, straightener.image(sensed["rgb"]), pose, joints, mask, depth, depth_over(mask, depth))
                 count, last = count + 1, stamp
             obs, _, terminated, truncated, info = env.step(policy.act(obs))
-            done = terminated or truncated
+            done = terminated or truncated or float(base.sensed["time"][0]) >= seconds
     outcome = bool(info["success"]), bool(info["collision"])
     return asdict(RecordedEpisode(scenario, seed, folder, count, *outcome))
 

@@ -7,12 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.perception.detection.colour import ColourDetector
 from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
+from fixation_gym.recording_commands import Record
 from fixation_gym.recordings.catalogue import open_recording
 from fixation_gym.replay.config import ReplayConfig
 from fixation_gym.replay.run import replay
@@ -113,6 +115,23 @@ def test_a_finished_episode_is_not_recorded_again(recorded):
     assert summary["pictures"] == 2 * STEPS
     assert (recorded / "opaque-000000" / "frames.csv").stat().st_mtime_ns == before
     assert len(open_recording(recorded / "opaque-000001")) == STEPS
+
+
+def test_clips_end_after_their_seconds_and_are_not_mixed_with_others(tmp_path):
+    from fixation_gym.recordings.record import record
+
+    config = dataclasses.replace(CONFIG, scenarios=("clear",))
+    assert record(config, tmp_path / "set", seconds=0.4)["pictures"] == 10
+    times = [frame.time for frame in open_recording(tmp_path / "set" / "clear-000000")]
+    np.testing.assert_allclose(times, 0.04 * np.arange(10), atol=1e-6)
+    with pytest.raises(UsageError):
+        record(config, tmp_path / "set", seconds=0.8)
+
+
+def test_bad_lengths_are_refused_with_what_is_allowed():
+    for seconds in (0.0, -1.0, 30.0):
+        with pytest.raises(UsageError, match=r"--seconds must be above 0 and at most 25"):
+            Record(seconds=seconds).check()
 
 
 def test_late_pictures_are_recorded_once_with_the_pose_and_truth_of_their_time(tmp_path):
