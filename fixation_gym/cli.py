@@ -24,7 +24,7 @@ from fixation_gym.experiments.distance.config import DistanceConfig
 from fixation_gym.experiments.scenarios.config import ScenariosConfig
 from fixation_gym.export.config import ExportConfig
 from fixation_gym.gl import MissingGLError, select_backend
-from fixation_gym.learning_commands import Compare, Train
+from fixation_gym.learning_commands import Compare, Train, Transfer
 from fixation_gym.names import Names
 from fixation_gym.recording_commands import Record, Replay
 from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, Robustness, print_different
@@ -213,6 +213,7 @@ Commands = (
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Compare, tyro.conf.subcommand("compare")]
+    | Annotated[Transfer, tyro.conf.subcommand("transfer")]
     | Annotated[Distance, tyro.conf.subcommand("distance")]
     | Annotated[Scenarios, tyro.conf.subcommand("scenarios")]
     | Annotated[Necessity, tyro.conf.subcommand("necessity")]

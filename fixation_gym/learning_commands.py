@@ -1,10 +1,11 @@
-"""The commands ``train`` and ``compare``; see ``cli``."""
+"""The commands ``train``, ``compare`` and ``transfer``; see ``cli``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fixation_gym.experiments.transfer.config import TransferConfig
 from fixation_gym.gl import select_backend
 from fixation_gym.names import Names
 from fixation_policies.rl.config import TrainConfig, require_learning_packages
@@ -96,4 +97,25 @@ class Compare:
         print(f"{format_table(summary['table'])}\n\n{format_differences(summary['differences'])}\n")
         for name in (SUMMARY_FILE, TABLE_FILE, DIFFERENCES_FILE, CURVES_FILE, FIGURE_FILE):
             print(self.out / name)
+        return 0
+
+
+@dataclass(frozen=True)
+class Transfer(TransferConfig):
+    """Train agents where things are plain, test them where they look otherwise. The same command again resumes."""
+
+    out: Path = Path("out/transfer")
+    """Folder of the results."""
+
+    def run(self) -> int:
+        """Train, test and print the table."""
+        self.check()
+        select_backend()
+        from fixation_gym.evaluation.storage import SUMMARY_FILE
+        from fixation_gym.experiments.transfer.run import CSV_FILE, DIFFERENCES_FILE, FIGURE_FILE, measure
+        from fixation_gym.experiments.transfer.statistics import format_table
+
+        print(format_table(measure(self, self.out)["rows"]))
+        names = (SUMMARY_FILE, CSV_FILE, DIFFERENCES_FILE, FIGURE_FILE)
+        print("\n" + "\n".join(str(self.out / name) for name in names))
         return 0

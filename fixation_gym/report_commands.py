@@ -88,7 +88,7 @@ class Ladder(SeveralPolicies):
         from fixation_gym.envs.config import SCENARIOS
         from fixation_policies.ladder import BESIDE, LADDER
 
-        red = tuple(name for name, item in SCENARIOS.items() if not item.any_colour)
+        red = tuple(name for name, item in SCENARIOS.items() if item.red_target)
         config = replace(self, scenarios=self.scenarios or red)
         check_names(config.scenarios, red, "scenario")
         config.check()

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
+from fixation_gym.envs.field_checks import require_names, require_number, require_range, require_shape
 from fixation_gym.envs.object_pool import MAX_OBSTACLES, TARGET_SHAPES
 from fixation_gym.envs.obstacle_kinds import KIND_NAMES
 from fixation_gym.envs.shapes import MATERIALS, PLAIN_MATERIALS
@@ -30,6 +31,9 @@ TABLE_FORCE = 5.0
 
 OBSTACLE_MOTIONS = ("driven", "pushed")
 """What a moving obstacle may do: go to and fro at constant speed, or be pushed to another place once."""
+LOOKS = ("usual", "tinted", "coloured", "plain")
+"""How obstacles or the room may look: as usual; in pale colours; in strong ones with drawn textures; without texture.
+No drawn colour is the target's red."""
 
 
 @dataclass(frozen=True)
@@ -88,33 +92,51 @@ class Scenario:
     any_colour: bool = False
     """Whether target, distractor and obstacles are of any colour and texture; the box in the first image tells which
     thing is the target. Nothing else of a scene differs."""
+    obstacle_looks: str = "usual"
+    """Colours and textures of obstacles, one of ``LOOKS``. Nothing else of a scene differs."""
+    room_looks: str = "usual"
+    """The same of table, sheets, boards, floor and walls."""
+    target_hue_deg: float = 0.0
+    """Turn of the hue of target and distractor, to either side, deg; the box in the first image tells which thing is
+    the target. Nothing else of a scene differs."""
+    light_slant: float = 1.0
+    """Factor on the horizontal part of the light's direction, which is at most 0.5 along x and y of what goes down."""
 
     def __post_init__(self) -> None:
-        _require_names("obstacle_materials", self.obstacle_materials, MATERIALS)
-        _require_names("obstacle_kinds", self.obstacle_kinds, KIND_NAMES)
-        _require_names("first_kinds", self.first_kinds, KIND_NAMES)
-        _require_names("target_shapes", self.target_shapes, tuple(shape.name for shape in TARGET_SHAPES))
+        require_names("obstacle_materials", self.obstacle_materials, MATERIALS)
+        require_names("obstacle_kinds", self.obstacle_kinds, KIND_NAMES)
+        require_names("first_kinds", self.first_kinds, KIND_NAMES)
+        require_names("target_shapes", self.target_shapes, tuple(shape.name for shape in TARGET_SHAPES))
         for name in ("obstacle_count", "moving_count"):
-            _require_range(name, getattr(self, name), 0, MAX_OBSTACLES)
+            require_range(name, getattr(self, name), 0, MAX_OBSTACLES)
             if not all(isinstance(count, int) for count in getattr(self, name)):
                 raise ValueError(f"{name} must be two whole numbers, got {getattr(self, name)}")
-        _require_range("grasp_width", self.grasp_width, *ROBOT.hand.grasp_widths)
-        _require_range("alpha", self.alpha, 0.0, 1.0)
-        _require_range("free_elevation_deg", self.free_elevation_deg, *ROBOT.arm.reach.elevations_deg)
-        _require_shape("free_azimuth_shape", self.free_azimuth_shape)
-        _require_probability("most_open", self.most_open)
-        _require_range("view_elevation_deg", self.view_elevation_deg, 30.0, 72.0)
-        _require_names("obstacle_motions", self.obstacle_motions, OBSTACLE_MOTIONS)
-        _require_range("drive_speed", self.drive_speed, 0.01, 0.10)
-        _require_range("obstacle_push", self.obstacle_push, 0.0, 0.10)
-        _require_range("target_push", self.target_push, 0.0, 0.08)
-        _require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
-        _require_probability("target_moves", self.target_moves)
-        _require_probability("distractor", self.distractor)
+        require_range("grasp_width", self.grasp_width, *ROBOT.hand.grasp_widths)
+        require_range("alpha", self.alpha, 0.0, 1.0)
+        require_range("free_elevation_deg", self.free_elevation_deg, *ROBOT.arm.reach.elevations_deg)
+        require_shape("free_azimuth_shape", self.free_azimuth_shape)
+        require_number("most_open", self.most_open, 0.0, 1.0)
+        require_range("view_elevation_deg", self.view_elevation_deg, 30.0, 72.0)
+        require_names("obstacle_motions", self.obstacle_motions, OBSTACLE_MOTIONS)
+        require_range("drive_speed", self.drive_speed, 0.01, 0.10)
+        require_range("obstacle_push", self.obstacle_push, 0.0, 0.10)
+        require_range("target_push", self.target_push, 0.0, 0.08)
+        require_range("push_time", self.push_time, 0.0, EPISODE_SECONDS)
+        require_number("target_moves", self.target_moves, 0.0, 1.0)
+        require_number("distractor", self.distractor, 0.0, 1.0)
         for name in ("through_sight", "discovery", "coloured_frames", "any_colour", "several_mirrors"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"{name} must be true or false, got {getattr(self, name)!r}")
+        require_names("obstacle_looks", (self.obstacle_looks,), LOOKS)
+        require_names("room_looks", (self.room_looks,), LOOKS)
+        require_number("target_hue_deg", self.target_hue_deg, 0.0, 180.0)
+        require_number("light_slant", self.light_slant, 0.0, 20.0)
         self._check_obstacles()
+
+    @property
+    def red_target(self) -> bool:
+        """Whether the target has the usual colour; otherwise the box in the first image tells which thing it is."""
+        return not (self.any_colour or self.target_hue_deg)
 
     def _check_obstacles(self) -> None:
         """Check that fields fit together."""
@@ -136,35 +158,6 @@ class Scenario:
             raise ValueError(
                 "obstacle_materials of mirrors alone allow one obstacle; add another material, or several_mirrors"
             )
-
-
-def _require_names(field: str, names: tuple[str, ...], allowed: tuple[str, ...]) -> None:
-    if not isinstance(names, (tuple, list)):
-        raise ValueError(f"{field} must be a list of names from {list(allowed)}, got {names!r}")
-    unknown = [name for name in names if name not in allowed]
-    if unknown:
-        raise ValueError(f"unknown {field} {unknown}; choose from {list(allowed)}")
-
-
-def _require_range(field: str, values: tuple[float, float], lowest: float, highest: float) -> None:
-    """Check a pair (low, high) of numbers."""
-    pair = isinstance(values, (tuple, list)) and len(values) == 2
-    if not pair or not all(isinstance(value, (int, float)) for value in values):
-        raise ValueError(f"{field} must be two numbers (low, high), got {values!r}")
-    if not lowest <= values[0] <= values[1] <= highest:
-        raise ValueError(f"{field} must be (low, high) within {lowest}..{highest}, got {values}")
-
-
-def _require_shape(field: str, values: tuple[float, float]) -> None:
-    """Check the exponents of a beta distribution; beyond these bounds it would be nearly one value."""
-    pair = isinstance(values, (tuple, list)) and len(values) == 2
-    if not pair or not all(isinstance(value, (int, float)) and 0.2 <= value <= 5.0 for value in values):
-        raise ValueError(f"{field} must be two numbers within 0.2..5, got {values!r}")
-
-
-def _require_probability(field: str, value: float) -> None:
-    if not isinstance(value, (int, float)) or not 0.0 <= value <= 1.0:
-        raise ValueError(f"{field} must be a number within 0..1, got {value!r}")
 
 
 def _reached(low: float, high: float) -> tuple[float, float]:

@@ -31,8 +31,10 @@ def developed(
         middle_s: middle of the exposure of the middle row, s, for the light's flicker.
         rng: of the noise.
     """
-    if noise.light != 1.0 or noise.flicker or drift.any():
-        factor = _light(noise, middle_s, image.shape[0])[:, None, None] * np.exp(drift[0] + _by_channel(drift))
+    lamp = np.array([noise.light_red, 1.0, noise.light_blue])
+    if noise.light != 1.0 or noise.flicker or drift.any() or (lamp != 1.0).any():
+        gains = lamp * np.exp(drift[0] + _by_channel(drift))
+        factor = _light(noise, middle_s, image.shape[0])[:, None, None] * gains
         image = np.clip(np.rint(image * factor.astype(np.float32)), 0, 255).astype(np.uint8)
     image = measure_image(image, noise, exposure, rng)
     if noise.hue_shift_deg:

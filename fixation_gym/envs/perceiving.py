@@ -10,6 +10,6 @@ from fixation_gym.robots import ROBOT
 
 
 def perception_for(scenario: Scenario, intrinsics: Intrinsics) -> Perception:
-    """Perception that knows the table; where targets have any colour it follows what the first box shows."""
-    detector = BoxTracker(intrinsics) if scenario.any_colour else None
+    """Perception that knows the table; where targets are not red it follows what the first box shows."""
+    detector = None if scenario.red_target else BoxTracker(intrinsics)
     return Perception(intrinsics, support_height_m=ROBOT.workspace.table_height, detector=detector)

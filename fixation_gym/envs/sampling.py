@@ -8,7 +8,6 @@ drawn that leave it, and those are taken that bar the first line of sight, the w
 
 from __future__ import annotations
 
-import colorsys
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,6 +20,7 @@ from fixation_gym.control.reach import sample_direction
 from fixation_gym.envs.barriers import View, add_movers, bar_ways, draw_pool, with_some_across
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.goal import Goal, Way, sample_goal, sample_target
+from fixation_gym.envs.looks import TABLE_TEXTURES, dressed
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.room import FREE_ROOM
 from fixation_gym.envs.scene import ObstacleSpec, SceneSpec, TargetSpec
@@ -31,10 +31,6 @@ _VIEW_DISTANCE = (0.42, 0.49)
 """Range of the distance between camera and target at the start, m."""
 _DISTRACTOR_DISTANCE = (0.12, 0.22)
 """Range of the distance between target and distractor, m."""
-_TARGET_TEXTURES = ("bricks", "wood_light", "metal")
-"""Textures of targets of any colour."""
-_FRAME_HUES = (1.0 / 8.0, 7.0 / 8.0)
-"""Range of the hue of coloured frames, 0..1: anything but the target's red."""
 _ELEVATION_SHAPE = (0.5, 0.65)
 """Beta distribution of the free way's elevation. Evenly drawn, ways in the middle would be free most often, for there
 are ways on all sides of them that take them along; so the ends come up more."""
@@ -108,21 +104,18 @@ def _propose(scenario: Scenario, free: tuple[float, float], rng: np.random.Gener
 def _scene(
     scenario: Scenario, goal: Goal, view: View, obstacles: tuple[ObstacleSpec, ...], rng: np.random.Generator
 ) -> SceneSpec:
-    light = rng.uniform(-0.5, 0.5, 2)
+    light = scenario.light_slant * rng.uniform(-0.5, 0.5, 2)
     scene = SceneSpec(
         target=goal.target,
         obstacles=obstacles,
         camera_position=_vector(view.camera),
         gaze_point=_vector(view.gaze),
         light_direction=(float(light[0]), float(light[1]), -1.0),
-        table_texture=str(rng.choice(("table_wood", "table_plank", "table_felt"))),
+        table_texture=str(rng.choice(TABLE_TEXTURES)),
         distractor=view.distractor,
         free_way=(goal.free.azimuth, goal.free.elevation) if obstacles else None,
     )
-    # From a generator of their own: nothing else of the scene depends on the colours.
-    if scenario.coloured_frames:
-        return _with_coloured_frames(scene, rng.spawn(1)[0])
-    return _with_any_colours(scene, rng.spawn(1)[0]) if scenario.any_colour else scene
+    return dressed(scenario, scene, rng)
 
 
 def _sample_view(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> View | None:
@@ -165,41 +158,6 @@ def _told_apart(target: TargetSpec, distractor: TargetSpec, camera: FloatArray, 
         ray = np.array(red.position) - camera
         offsets.append(float(np.linalg.norm(ray - (ray @ axis) * axis)) / float(ray @ axis))
     return offsets[1] >= 1.5 * offsets[0] + 0.05
-
-
-def _with_coloured_frames(scene: SceneSpec, rng: np.random.Generator) -> SceneSpec:
-    obstacles = []
-    for obstacle in scene.obstacles:
-        red, green, blue = colorsys.hsv_to_rgb(rng.uniform(*_FRAME_HUES), rng.uniform(0.0, 1.0), rng.uniform(0.1, 1.0))
-        obstacles.append(replace(obstacle, frame_rgba=(red, green, blue, 1.0)))
-    return replace(scene, obstacles=tuple(obstacles))
-
-
-def _with_any_colours(scene: SceneSpec, rng: np.random.Generator) -> SceneSpec:
-    """Targets and obstacles of any colour, half of them textured; a distractor does not look like the target."""
-    hue = float(rng.uniform(0.0, 1.0))
-    target, distractor = _dressed(scene.target, hue, rng), scene.distractor
-    if distractor is not None:
-        distractor = _dressed(distractor, (hue + float(rng.uniform(0.2, 0.8))) % 1.0, rng)
-    obstacles = tuple(
-        replace(
-            obstacle,
-            tint=_colour(float(rng.uniform(0.0, 1.0)), rng),
-            frame_rgba=_colour(float(rng.uniform(0.0, 1.0)), rng),
-        )
-        for obstacle in scene.obstacles
-    )
-    return replace(scene, target=target, distractor=distractor, obstacles=obstacles)
-
-
-def _dressed(spec: TargetSpec, hue: float, rng: np.random.Generator) -> TargetSpec:
-    texture = str(rng.choice(_TARGET_TEXTURES)) if rng.random() < 0.5 else None
-    return replace(spec, rgba=_colour(hue, rng), texture=texture)
-
-
-def _colour(hue: float, rng: np.random.Generator) -> tuple[float, float, float, float]:
-    red, green, blue = colorsys.hsv_to_rgb(hue, rng.uniform(0.4, 1.0), rng.uniform(0.3, 1.0))
-    return red, green, blue, 1.0
 
 
 def _vector(values: FloatArray) -> Vector:

@@ -20,6 +20,28 @@ DARK_FRAME = (0.16, 0.17, 0.20, 1.0)
 """Usual colour of frames and rims."""
 
 
+ROOM = (
+    "table_visual",
+    *(f"sheet{i}" for i in range(6)),
+    *(f"board{i}" for i in range(3)),
+    "floor",
+    *(f"wall_{side}_visual" for side in ("leftcorner", "rightcorner", "left", "right", "rear", "front")),
+)
+"""Names of what a scene has around its things, the table first."""
+
+
+@dataclass(frozen=True)
+class RoomSurface:
+    """How a piece of the room looks."""
+
+    name: str
+    """One of ``ROOM``."""
+    rgba: tuple[float, float, float, float]
+    """Its colour, or the tint of its texture."""
+    texture: str | None = None
+    """None: the usual one."""
+
+
 @dataclass(frozen=True)
 class TargetSpec:
     """A red object: shape, scale per axis, centre in base at reset in m, rotation about the vertical in rad."""
@@ -92,5 +114,7 @@ class SceneSpec:
     table_texture: str
     distractor: TargetSpec | None = None
     """Another object of the target's colour. At the start the target is the one nearer to the image centre."""
+    room: tuple[RoomSurface, ...] = ()
+    """What of the room does not look as usual."""
     free_way: tuple[float, float] | None = None
     """Azimuth in base and elevation of the way that was left free, rad; None without obstacles."""

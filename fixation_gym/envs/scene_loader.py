@@ -14,7 +14,7 @@ import numpy as np
 from fixation_gym.envs.motion import Motion
 from fixation_gym.envs.object_pool import SLOTS, TARGET_SHAPES, target_shape
 from fixation_gym.envs.pool_slots import slots_for
-from fixation_gym.envs.scene import UNTINTED, ObstacleSpec, SceneSpec, TargetSpec
+from fixation_gym.envs.scene import ROOM, UNTINTED, ObstacleSpec, SceneSpec, TargetSpec
 from fixation_gym.envs.scene_mjcf import (
     FINISH_MATERIALS,
     MIRROR_MATERIAL,
@@ -78,7 +78,7 @@ class SceneLoader:
         }
         self._bodies = {name: model.body(name).id for name in [*RED_BODIES, *self._slots]}
         self._materials = {model.mat(i).name: i for i in range(model.nmat)}
-        self._table_geom = model.geom("table_visual").id
+        self._room = {name: model.geom(name).id for name in ROOM}
         pool = [entry.geom for entry in red]
         pool += [geom for geoms in self._slots.values() for geom in geoms]
         model.geom_contype[pool] = model.geom_conaffinity[pool] = 0
@@ -91,7 +91,12 @@ class SceneLoader:
         model = self._model
         for name, values in self._untouched.items():
             getattr(model, name)[:] = values
-        model.geom_matid[self._table_geom] = self._materials[scene.table_texture]
+        model.geom_matid[self._room["table_visual"]] = self._materials[scene.table_texture]
+        for surface in scene.room:
+            geom = self._room[surface.name]
+            model.geom_rgba[geom] = surface.rgba
+            if surface.texture is not None:
+                model.geom_matid[geom] = self._materials[surface.texture]
         light = np.array(scene.light_direction)
         model.light_dir[:] = light / np.linalg.norm(light)
         placed = {"target": self._load_red("target", scene.target)}

@@ -60,6 +60,10 @@ class SensorNoise:
     """Quality of JPEG compression, 1 to 100; 0: none."""
     light: float = 1.0
     """Factor on every grey level before image noise: how much of the usual light there is."""
+    light_red: float = 1.0
+    """Factor on red before image noise: light of another colour that the white balance does not follow."""
+    light_blue: float = 1.0
+    """The same on blue."""
     gain_drift: float = 0.0
     """Relative slow change of the gain of all channels."""
     white_balance_drift: float = 0.0

@@ -148,5 +148,5 @@ def make_policy(name: str, env: Any, detector: str | None = None) -> Policy:
 def _detector(name: str | None, variant: ServoVariant, env: Any) -> Callable[[Intrinsics], Detector]:
     """What makes the detector of that name."""
     if name is None:
-        return variant.detector or (BoxTracker if env.scenario.any_colour else ColourDetector)
+        return variant.detector or (ColourDetector if env.scenario.red_target else BoxTracker)
     return detector_named(name)

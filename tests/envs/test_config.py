@@ -45,6 +45,10 @@ def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
         ({"obstacle_push": [0.05, 0.2]}, "0.0..0.1"),
         ({"target_push": [0.05, 0.2]}, "0.0..0.08"),
         ({"distractor": 2}, "0..1"),
+        ({"obstacle_looks": "fancy"}, "'usual', 'tinted', 'coloured', 'plain'"),
+        ({"room_looks": "fancy"}, "'usual', 'tinted', 'coloured', 'plain'"),
+        ({"target_hue_deg": 200}, "0..180"),
+        ({"light_slant": -1}, "0..20"),
         (7, "name or a mapping"),
     ],
 )

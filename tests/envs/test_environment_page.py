@@ -50,6 +50,8 @@ def same(cell, value):
     """Whether a cell of a table of fields tells a default."""
     if isinstance(value, bool):
         return cell == str(value).lower()
+    if isinstance(value, str):
+        return cell == value
     if isinstance(value, tuple) and (not value or isinstance(value[0], str)):
         return cell == ("all" if value else "none")
     return np.allclose([float(part) for part in cell.split(",")], value)

@@ -90,6 +90,20 @@ class CompareConfig:
         return self.training.workers if self.workers == 1 and self.backend == "loky" else 1
 
 
+def train_cell(cell: workers.Cell) -> dict[str, Any]:
+    """Train one agent. It goes on where an earlier call was killed, and returns at once if that had finished.
+
+    Returns:
+        The summary of the training, and ``agent``, the path of the final agent.
+    """
+    from fixation_policies.rl.train import FINAL_FILE, train
+
+    folder = Path(cell["folder"])
+    values = {**cell["training"], "image_size": tuple(cell["training"]["image_size"])}
+    summary = train(TrainConfig(**values), folder, resume=(folder / RUN_FILE).exists())
+    return {**summary, "agent": str(folder / FINAL_FILE)}
+
+
 def run_cell(cell: workers.Cell) -> dict[str, Any]:
     """Train and test one agent, or test the servo. It goes on where an earlier call was killed.
 
@@ -101,11 +115,8 @@ def run_cell(cell: workers.Cell) -> dict[str, Any]:
     trained: dict[str, Any] = {"curve": [], "wall_s": 0.0, "seconds": {}}
     policy, image_size = SERVO, surroundings(SERVO).image_size
     if cell["config"] != SERVO:
-        from fixation_policies.rl.train import FINAL_FILE, train
-
-        values = {**cell["training"], "image_size": tuple(cell["training"]["image_size"])}
-        trained = train(TrainConfig(**values), folder, resume=(folder / RUN_FILE).exists())
-        policy, image_size = str(folder / FINAL_FILE), tuple(cell["training"]["image_size"])
+        trained = train_cell(cell)
+        policy, image_size = trained["agent"], tuple(cell["training"]["image_size"])
     test = EvaluationConfig(
         policy,
         scenarios=tuple(cell["scenarios"]),

@@ -1,0 +1,1 @@
+"""Trained where things are plain, tested where they look otherwise."""
