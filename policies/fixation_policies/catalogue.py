@@ -99,9 +99,10 @@ def surroundings(name: str) -> Surroundings:
     if not name.endswith(AGENT_SUFFIX):
         return Surroundings()
     card = read_card(Path(name))
-    if card.config == "residual":
+    learner = CONFIGS[card.config]
+    if learner.residual:
         return Surroundings(image_size=card.image_size)
-    arguments = {"observation": CONFIGS[card.config]}
+    arguments = {"observation": learner.observation}
     return Surroundings("fixation_gym:FixationPickZFC-v0", arguments, card.image_size)
 
 

@@ -5,6 +5,7 @@ import pytest
 from rl_fakes import FakeZFC
 
 from fixation_policies.rl.agent import Decider
+from fixation_policies.rl.config import CONFIGS
 from fixation_policies.rl.decisions import PERIODS, DecisionEnv, FixedEpisodes, env_action
 from fixation_policies.rl.inputs import input_space
 
@@ -32,7 +33,7 @@ def test_an_action_is_held_and_rewards_are_summed(env, inner):
     assert sum(info["reward_terms"].values()) == reward
     assert not terminated
     assert not truncated
-    assert input_space("zfc").contains(inputs)
+    assert input_space(CONFIGS["zfc"]).contains(inputs)
 
 
 def test_a_whole_grasp_is_one_step_and_ends_when_the_next_action_counts(env, inner):
@@ -98,7 +99,7 @@ def test_an_agent_acts_at_the_control_rate_as_the_learner_did_by_decisions():
     for _ in range(20):
         inputs, *_ = env.step(network.predict(inputs, deterministic=True)[0])
 
-    decider = Decider(MadeUpNetwork(), 4)
+    decider = Decider(MadeUpNetwork(), 4, CONFIGS["zfc"])
     obs, _ = used.reset(seed=0)
     held = env_action(decider.act(obs))
     while len(used.actions) < len(trained.actions):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fixation_gym.envs.zfc_observation import zfc_observation_space
-from fixation_policies.rl.inputs import VIEWS, busy, input_space, network_inputs, observation_name, remember
+from fixation_policies.rl.config import CONFIGS
+from fixation_policies.rl.inputs import PERIODS, VIEWS, busy, input_space, learner_for, network_inputs, remember
 
 
 def zfc_obs(cells, stage=None):
@@ -20,8 +21,8 @@ def seen(*maps):
     """The view after maps that are the same in all cells: one value for now, one for the memory."""
     memory = None
     for cells in maps:
-        memory = remember(memory, zfc_obs(cells))
-    view = network_inputs(zfc_obs(maps[-1]), memory)["view"]
+        memory = remember(memory, zfc_obs(cells), CONFIGS["zfc"])
+    view = network_inputs(zfc_obs(maps[-1]), memory, CONFIGS["zfc"])["view"]
     return [int(value) for value in view[:, 5, 7]]
 
 
@@ -44,31 +45,50 @@ def test_evidence_fades_to_half_in_a_second_without_sight():
 
 
 def test_images_show_what_changed():
-    black, white = (zfc_obs(128) | {"rgb": np.full((96, 128, 3), grey, np.uint8)} for grey in (0, 200))
-    for obs in (black, white):
-        del obs["zfc_map"]
-    memory = remember(remember(None, black), white)
-    view = network_inputs(white, memory)["view"]
+    learner, (black, white) = CONFIGS["rgb"], images(0, 200)
+    memory = remember(remember(None, black, learner), white, learner)
+    view = network_inputs(white, memory, learner)["view"]
     assert view.shape == (6, 48, 48)
     assert set(view[:3].ravel()) == {200}
     assert set(view[3:].ravel()) == {20}
 
 
-@pytest.mark.parametrize("observation", VIEWS)
-def test_inputs_are_in_their_space_for_every_observation(observation):
-    space = zfc_observation_space(observation, (64, 80))
+def test_stacked_images_are_a_decision_apart_and_the_first_stands_for_those_before():
+    learner, memory, views = CONFIGS["rgb_augmented"], None, []
+    for obs in images(*range(12)):
+        memory = remember(memory, obs, learner)
+        views.append(network_inputs(obs, memory, learner)["view"])
+    assert views[0].shape == (9, 64, 64)
+    levels = [[int(value) for value in view[::3, 5, 7]] for view in views]
+    assert levels[0] == [0, 0, 0]
+    assert levels[7] == [7, 7 - PERIODS, 0]
+    assert levels[11] == [11, 11 - PERIODS, 11 - 2 * PERIODS]
+
+
+def images(*greys):
+    """Observations whose images are of one grey level each."""
+    base = {key: value for key, value in zfc_obs(128).items() if key != "zfc_map"}
+    return [base | {"rgb": np.full((96, 128, 3), grey, np.uint8)} for grey in greys]
+
+
+@pytest.mark.parametrize("learner", CONFIGS.values(), ids=CONFIGS)
+def test_inputs_are_in_their_space_for_every_configuration(learner):
+    space = zfc_observation_space(learner.observation, (64, 80))
     space.seed(0)
     memory = None
     for _ in range(20):
         obs = space.sample()
-        memory = remember(memory, obs)
-        assert input_space(observation).contains(network_inputs(obs, memory))
+        memory = remember(memory, obs, learner)
+        assert input_space(learner).contains(network_inputs(obs, memory, learner))
 
 
 def test_inputs_differ_between_configurations_only_in_the_view():
     obs = zfc_obs(200)
     blind = {key: obs[key] for key in ("fixation", "proprio")}
-    with_map, without = network_inputs(obs, remember(None, obs)), network_inputs(blind, remember(None, blind))
+    with_map, without = (
+        network_inputs(seen, remember(None, seen, CONFIGS[name]), CONFIGS[name])
+        for name, seen in (("zfc", obs), ("blind", blind))
+    )
     assert set(with_map) - set(without) == {"view"}
     np.testing.assert_array_equal(with_map["vector"], without["vector"])
 
@@ -80,4 +100,4 @@ def test_busy_in_every_stage_and_only_there():
 
 @pytest.mark.parametrize("observation", VIEWS)
 def test_an_observation_is_known_by_its_space(observation):
-    assert observation_name(zfc_observation_space(observation, (64, 80))) == observation
+    assert learner_for(zfc_observation_space(observation, (64, 80))) == CONFIGS[observation]

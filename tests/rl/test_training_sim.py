@@ -10,6 +10,8 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.config import EvaluationConfig
+from fixation_gym.evaluation.evaluate import evaluate
 from fixation_policies.rl import train as training
 from fixation_policies.rl.agent_file import read_card
 from fixation_policies.rl.checkpoints import latest_checkpoint, load_model
@@ -103,6 +105,16 @@ def test_its_agent_is_evaluated_and_acts_as_the_model(killed_and_resumed, tmp_pa
     training.write_agent(folder / FINAL_FILE, training.card_of(other, training.Progress()), {})
     assert main(arguments) == 2
     assert "holds another run, with policy_sha256" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("config", ["privileged", "rgb_augmented"])
+def test_other_configurations_train_and_their_agents_act(config, tmp_path):
+    short = replace(SHORT, config=config, steps=12, workers=1, learning_starts=4)
+    summary = train(short, tmp_path / "run")
+    assert [entry["decisions"] for entry in summary["curve"]] == [12]
+    agent = str(tmp_path / "run" / FINAL_FILE)
+    test = EvaluationConfig(agent, scenarios=("clear",), episodes=1, image_size=(48, 64))
+    assert evaluate(test, tmp_path / "test")["scenarios"]["clear"]["episodes"] == 1
 
 
 def test_a_comparison_trains_and_tests_its_own_agent_and_the_servo(tmp_path):

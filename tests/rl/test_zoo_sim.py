@@ -10,7 +10,7 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 import fixation_gym  # noqa: F401  (registers the ids)
-from fixation_policies.rl.config import TrainConfig
+from fixation_policies.rl.config import CONFIGS, TrainConfig
 from fixation_policies.rl.inputs import input_space
 from fixation_policies.rl.zoo import ppo, sac
 
@@ -41,7 +41,7 @@ def test_a_configuration_is_of_settings_that_exist_and_makes_a_model_that_acts(a
     assert actions.shape == (1, *envs.action_space.shape)
     assert np.all(np.abs(actions) <= 1.0)
     if env_id == "FixationPickZFC-v0":  # what 'train' learns in
-        assert envs.observation_space == input_space("zfc")
+        assert envs.observation_space == input_space(CONFIGS["zfc"])
         assert settings["env_kwargs"]["image_size"] == TrainConfig().image_size
     envs.close()
 

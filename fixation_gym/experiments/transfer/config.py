@@ -41,7 +41,7 @@ class Candidate:
 class TransferConfig:
     """Whom to train on which scenario, and on which shifts to test them."""
 
-    configs: Annotated[Names, tyro.conf.arg(name="config")] = ("zfc", "rgb", "blind")
+    configs: Annotated[Names, tyro.conf.arg(name="config")] = ("zfc", "rgb_augmented", "blind")
     """Configurations to train, separated by commas; the others are compared with the first, seed by seed. "" for
     none."""
     seeds: int = 5

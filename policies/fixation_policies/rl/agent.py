@@ -21,10 +21,20 @@ from fixation_gym.perception.percept import Percept
 from fixation_gym.types import Observation
 from fixation_policies.base import Action, Estimate
 from fixation_policies.rl.agent_file import AgentCard, read_agent
-from fixation_policies.rl.config import CONFIGS
-from fixation_policies.rl.decisions import PERIODS, env_action
-from fixation_policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
-from fixation_policies.rl.inputs import STAGE, VIEWS, Memory, blind_stage, busy, input_space, network_inputs, remember
+from fixation_policies.rl.config import CONFIGS, Configuration
+from fixation_policies.rl.decisions import env_action
+from fixation_policies.rl.hyperparameters import settings_of
+from fixation_policies.rl.inputs import (
+    PERIODS,
+    STAGE,
+    VIEWS,
+    Memory,
+    blind_stage,
+    busy,
+    input_space,
+    network_inputs,
+    remember,
+)
 from fixation_policies.rl.residual import ResidualServo
 from fixation_policies.servo.servo_policy import ServoPolicy
 
@@ -34,9 +44,9 @@ _STAGES = tuple(stage.value for stage in Stage)
 class Decider:
     """A network with the clock and the memory that it was trained with."""
 
-    def __init__(self, network: Any, size: int) -> None:
-        """Use an SB3 policy that gives actions of this size."""
-        self._network, self._size = network, size
+    def __init__(self, network: Any, size: int, learner: Configuration) -> None:
+        """Use an SB3 policy that gives actions of this size, and was trained with this configuration."""
+        self._network, self._size, self._learner = network, size, learner
         self.reset()
 
     def reset(self) -> None:
@@ -49,13 +59,14 @@ class Decider:
     def act(self, obs: Mapping[str, Any]) -> NDArray[np.float32]:
         """Output for an observation of ``FixationPickZFC-v0``: a new one when the last has been held long enough."""
         if self._looking:
-            self._memory = remember(self._memory, obs)
+            self._memory = remember(self._memory, obs, self._learner)
         self._looking = not blind_stage(obs)  # in training the next image is not rendered then
         if busy(obs):
             self._periods = 0  # the first action after a manoeuvre is a new one
         else:
             if self._periods % PERIODS == 0:
-                self._action = self._network.predict(network_inputs(obs, self._memory), deterministic=True)[0]
+                inputs = network_inputs(obs, self._memory, self._learner)
+                self._action = self._network.predict(inputs, deterministic=True)[0]
             self._periods += 1
         return self._action
 
@@ -116,11 +127,11 @@ def load_agent(path: Path, env: Any) -> Agent | ResidualAgent:
         UsageError: if the file is damaged, or the agent needs another observation than ``env`` shows.
     """
     card, weights = read_agent(path)
-    observation = CONFIGS[card.config]
-    residual = card.config == "residual"
-    _check_observation(path, card, observation, residual, env.observation_space)
-    decider = Decider(_network(path, card, observation, 2 if residual else 4, weights), 2 if residual else 4)
-    if not residual:
+    learner = CONFIGS[card.config]
+    _check_observation(path, card, learner, env.observation_space)
+    size = 2 if learner.residual else 4
+    decider = Decider(_network(path, card, learner, size, weights), size, learner)
+    if not learner.residual:
         return Agent(card, decider)
     from fixation_policies.catalogue import make_policy
 
@@ -129,29 +140,30 @@ def load_agent(path: Path, env: Any) -> Agent | ResidualAgent:
     return ResidualAgent(card, decider, servo)
 
 
-def _check_observation(path: Path, card: AgentCard, observation: str, residual: bool, space: spaces.Dict) -> None:
+def _check_observation(path: Path, card: AgentCard, learner: Configuration, space: spaces.Dict) -> None:
     keys = set(space.keys())
-    if residual:
+    if learner.residual:
         if "time" not in keys:
             raise UsageError(f"{path} is a residual agent: it acts in FixationPick-v0")
         return
-    view = VIEWS[observation]
+    view = VIEWS[learner.observation]
     shown = {key for key in VIEWS.values() if key in keys}
     if "fixation" not in keys or shown != ({view} - {None}):
-        allowed = f'FixationPickZFC-v0 with observation="{observation}"'
-        assert observation in OBSERVATIONS
+        allowed = f'FixationPickZFC-v0 with observation="{learner.observation}"'
+        assert learner.observation in OBSERVATIONS
         raise UsageError(f"{path} is an agent of configuration {card.config}: it acts in {allowed}")
 
 
-def _network(path: Path, card: AgentCard, observation: str, size: int, weights: dict[str, Any]) -> Any:
+def _network(path: Path, card: AgentCard, learner: Configuration, size: int, weights: dict[str, Any]) -> Any:
     """The network with these weights; SB3's policy class around it prepares the inputs and scales the outputs."""
     torch.set_num_threads(1)  # a single input: threads cost more than they gain
-    inputs, actions = input_space(observation), spaces.Box(-1.0, 1.0, (size,), np.float32)
+    inputs, actions = input_space(learner), spaces.Box(-1.0, 1.0, (size,), np.float32)
+    arguments = settings_of(card.algorithm, learner)["policy_kwargs"]
     if card.algorithm == "ppo":
-        policy = MultiInputActorCriticPolicy(inputs, actions, ConstantSchedule(0.0), **PPO_SETTINGS["policy_kwargs"])
+        policy = MultiInputActorCriticPolicy(inputs, actions, ConstantSchedule(0.0), **arguments)
         target = policy
     else:
-        policy = MultiInputPolicy(inputs, actions, ConstantSchedule(0.0), **SAC_SETTINGS["policy_kwargs"])
+        policy = MultiInputPolicy(inputs, actions, ConstantSchedule(0.0), **arguments)
         target = policy.actor
     try:
         target.load_state_dict(weights)

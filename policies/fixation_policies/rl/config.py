@@ -10,14 +10,39 @@ from tyro.conf import Fixed
 
 from fixation_gym.errors import UsageError, check_names
 
-CONFIGS: dict[str, str] = {
-    "zfc": "zfc",
-    "blind": "blind",
-    "rgb": "rgb",
-    "privileged": "privileged",
-    "residual": "zfc",
+Convolution = tuple[int, int, int]
+"""(channels, size of the kernel, stride)"""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """What a learner sees, and with what network it looks."""
+
+    observation: str
+    """Of ``FixationPickZFC-v0``."""
+    residual: bool = False
+    """Whether it adds to the servo's lateral velocity, in ``FixationPick-v0``."""
+    image_cells: int = 48
+    """Images are shrunk to this height and width, px."""
+    image_frames: int = 0
+    """How many images it sees, a decision apart from each other; 0: the newest and a running mean."""
+    convolutions: tuple[Convolution, ...] = ((16, 4, 4),)
+    """A gradient step is most of what learning costs on a CPU, and a second convolution doubles the time of it."""
+    augmented: bool = False
+    """Whether images are shifted and change colour at random in every gradient step."""
+
+
+CONFIGS: dict[str, Configuration] = {
+    "zfc": Configuration("zfc"),
+    "blind": Configuration("blind"),
+    "rgb": Configuration("rgb"),
+    "privileged": Configuration("privileged"),
+    "residual": Configuration("zfc", residual=True),
+    "rgb_augmented": Configuration(
+        "rgb", image_cells=64, image_frames=3, convolutions=((16, 4, 4), (32, 3, 2), (32, 3, 1)), augmented=True
+    ),
 }
-"""Names of configurations, and the observation that each gets. "residual" adds to the servo's lateral velocity."""
+"""Configurations by name."""
 ALGORITHMS = ("sac", "ppo")
 
 TRAIN_SEEDS = 2_000_000_000
@@ -31,8 +56,9 @@ class TrainConfig:
     """One training run. A step is a decision of the learner. Fields that are ``Fixed`` are no options of ``train``."""
 
     config: str = "zfc"
-    """What the learner sees: zfc (zero-flow map), blind (no map), rgb (image), privileged (true map), or residual: the
-    map, to add to the servo's lateral velocity."""
+    """What the learner sees: zfc (zero-flow map), blind (no map), rgb (image), rgb_augmented (larger images, in other
+    places and colours at random), privileged (true map), or residual: the map, to add to the servo's lateral
+    velocity."""
     algorithm: str = "sac"
     """sac or ppo."""
     scenario: str = "mixed"
@@ -62,14 +88,9 @@ class TrainConfig:
     """SAC: decisions kept."""
 
     @property
-    def observation(self) -> str:
-        """The observation that the learner gets."""
+    def learner(self) -> Configuration:
+        """What the learner sees, and with what network."""
         return CONFIGS[self.config]
-
-    @property
-    def residual(self) -> bool:
-        """Whether the learner adds to the servo's velocity."""
-        return self.config == "residual"
 
     def check(self) -> None:
         """Check everything that can be checked without building an environment.

@@ -9,18 +9,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fixation_policies.rl.config import Configuration
 from fixation_policies.rl.inputs import (
+    PERIODS,
     Memory,
     blind_stage,
     busy,
     input_space,
+    learner_for,
     network_inputs,
-    observation_name,
     remember,
 )
 
-PERIODS = 5
-"""Control periods for which an action is held: 5 decisions per second."""
 _TRIGGER_BIAS = 0.8
 """Taken off the trigger, so that the first random actions seldom grasp: a grasp takes 100 control periods and more."""
 
@@ -37,10 +37,16 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
     Rewards and ``info["reward_terms"]`` are summed; ``info["periods"]`` counts.
     """
 
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
-        """Wrap ``FixationPickZFC-v0`` with any observation, or the residual learner's environment."""
+    def __init__(self, env: gym.Env[Any, Any], learner: Configuration | None = None) -> None:
+        """Wrap ``FixationPickZFC-v0`` with any observation, or the residual learner's environment.
+
+        Args:
+            env: the environment.
+            learner: who is to see its observation; None: the plainest one.
+        """
         super().__init__(env)
-        self.observation_space = input_space(observation_name(env.observation_space))
+        self._learner = learner or learner_for(env.observation_space)
+        self.observation_space = input_space(self._learner)
         self.action_space = spaces.Box(-1.0, 1.0, env.action_space.shape, np.float32)
         self._memory: Memory | None = None
         self._base: Any = env.unwrapped  # FixationPickEnv
@@ -50,8 +56,8 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start an episode."""
         obs, info = self.env.reset(seed=seed, options=options)
-        self._memory = remember(None, obs)
-        return network_inputs(obs, self._memory), {**info, "periods": 0}
+        self._memory = remember(None, obs, self._learner)
+        return network_inputs(obs, self._memory, self._learner), {**info, "periods": 0}
 
     def step(self, action: NDArray[np.float32]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Act until the next decision."""
@@ -60,7 +66,7 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
         while True:
             obs, reward, terminated, truncated, info = self.env.step(command)
             if self._base.camera_on:
-                self._memory = remember(self._memory, obs)
+                self._memory = remember(self._memory, obs, self._learner)
             total, periods = total + float(reward), periods + 1
             terms = {name: terms.get(name, 0.0) + value for name, value in info["reward_terms"].items()}
             was_grasping, grasping = grasping, busy(obs)
@@ -69,7 +75,7 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
             if terminated or truncated or (decide and not grasping):
                 break
         info = {**info, "reward_terms": terms, "periods": periods}
-        return network_inputs(obs, self._memory), total, terminated, truncated, info
+        return network_inputs(obs, self._memory, self._learner), total, terminated, truncated, info
 
 
 def env_action(action: NDArray[np.float32]) -> NDArray[np.float32]:

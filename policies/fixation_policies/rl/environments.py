@@ -35,14 +35,15 @@ def make_learner_env(config: TrainConfig, rank: int) -> gym.Env[Any, Any]:
         "image_size": config.image_size,
         "sensor_noise": config.sensor_noise,
     }
-    if config.residual:
+    learner = config.learner
+    if learner.residual:
         from fixation_policies.rl.residual import ResidualEnv
 
         env: gym.Env[Any, Any] = ResidualEnv(gym.make("FixationPick-v0", **arguments))
     else:
-        env = gym.make("FixationPickZFC-v0", observation=config.observation, **arguments)
+        env = gym.make("FixationPickZFC-v0", observation=learner.observation, **arguments)
     seeds = [VALIDATION_SEEDS + index for index in range(config.eval_episodes)][rank :: config.workers]
-    fixed = FixedEpisodes(DecisionEnv(env), seeds or [VALIDATION_SEEDS])
+    fixed = FixedEpisodes(DecisionEnv(env, learner), seeds or [VALIDATION_SEEDS])
     return Monitor(fixed, info_keywords=("is_success", "collision"))
 
 

@@ -1,9 +1,10 @@
-"""Settings of the algorithms, the same for every configuration. rl-zoo3 reads them, too."""
+"""Settings of the algorithms, the same for every configuration but for its network. rl-zoo3 reads them, too."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from fixation_policies.rl.config import Configuration
 from fixation_policies.rl.features import JoinedFeatures
 
 GAMMA = 0.98
@@ -29,3 +30,10 @@ PPO_SETTINGS: dict[str, Any] = {
     "ent_coef": 0.002,
     "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256], "log_std_init": -0.5},
 }
+
+
+def settings_of(algorithm: str, learner: Configuration) -> dict[str, Any]:
+    """Settings of an algorithm with the network of a configuration."""
+    settings = PPO_SETTINGS if algorithm == "ppo" else SAC_SETTINGS
+    network = {"convolutions": learner.convolutions, "augmented": learner.augmented}
+    return {**settings, "policy_kwargs": {**settings["policy_kwargs"], "features_extractor_kwargs": network}}

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.robots import ROBOT
+from fixation_policies.rl.config import CONFIGS, Configuration
 
 VIEWS: dict[str, str | None] = {"zfc": "zfc_map", "blind": None, "rgb": "rgb", "privileged": "true_map"}
 """Key of the view in the observation, by the observation's name."""
-IMAGE_CELLS = 48
-"""Images are shrunk to this height and width, px."""
+PERIODS = 5
+"""Control periods for which an action is held: 5 decisions per second."""
 _JOINTS = ROBOT.arm.joints
 STAGE = slice(_JOINTS + 13, _JOINTS + 17)
 """Of ``proprio``: stage of the manoeuvre."""
@@ -32,35 +33,40 @@ _GAIN = 0.25
 _IMAGE_LEAK = 0.9
 
 Memory = NDArray[np.float32]
-"""Of a view: shape (2, h, w) for maps, in [-1, 1]: now, and what has been seen; (6, h, w) for images, grey levels."""
+"""Of maps: shape (2, h, w), in [-1, 1], now and what has been seen. Of images: grey levels, shape (6, h, w), the newest
+and a running mean, or (3 n, h, w), those of the last n control periods, the newest first."""
 
 
-def input_space(observation: str) -> spaces.Dict:
-    """Space of the networks' inputs for an observation of that name."""
+def input_space(learner: Configuration) -> spaces.Dict:
+    """Space of the networks' inputs."""
     channels: dict[str, spaces.Space[Any]] = {"vector": spaces.Box(-10.0, 10.0, (_VECTOR,), np.float32)}
-    if VIEWS[observation] == "rgb":
-        channels["view"] = spaces.Box(0, 255, (6, IMAGE_CELLS, IMAGE_CELLS), np.uint8)
-    elif VIEWS[observation] is not None:
+    if VIEWS[learner.observation] == "rgb":
+        images = learner.image_frames or 2
+        channels["view"] = spaces.Box(0, 255, (3 * images, learner.image_cells, learner.image_cells), np.uint8)
+    elif VIEWS[learner.observation] is not None:
         channels["view"] = spaces.Box(0, 255, (2, CELLS, CELLS), np.uint8)
     return spaces.Dict(channels)
 
 
-def observation_name(space: spaces.Space[Any]) -> str:
-    """Name of the observation that has this space."""
+def learner_for(space: spaces.Space[Any]) -> Configuration:
+    """The plainest configuration whose observation has this space."""
     keys = space.keys() if isinstance(space, spaces.Dict) else ()
-    return next((name for name, key in VIEWS.items() if key in keys), "blind")
+    return CONFIGS[next((name for name, key in VIEWS.items() if key in keys), "blind")]
 
 
-def remember(memory: Memory | None, obs: Mapping[str, Any]) -> Memory | None:
+def remember(memory: Memory | None, obs: Mapping[str, Any], learner: Configuration) -> Memory | None:
     """Memory after another observation; ``memory`` is None before the first, and always without a view.
 
     Of a map it holds the newest, centred so that unknown is 0, and evidence that adds up and fades: what one pair of
     frames says is noisy and sparse, and things leave the image as the camera comes near. Of images it holds the
-    newest and a running mean, whose difference shows motion.
+    newest and a running mean, whose difference shows motion, or the last ones; before the first they were like it.
     """
     if "rgb" in obs:
-        small = cv2.resize(obs["rgb"], (IMAGE_CELLS, IMAGE_CELLS), interpolation=cv2.INTER_AREA)
-        image = np.moveaxis(small, 2, 0).astype(np.float32)
+        size = (learner.image_cells, learner.image_cells)
+        image = np.moveaxis(cv2.resize(obs["rgb"], size, interpolation=cv2.INTER_AREA), 2, 0).astype(np.float32)
+        if learner.image_frames:
+            kept = 1 + PERIODS * (learner.image_frames - 1)
+            return np.tile(image, (kept, 1, 1)) if memory is None else np.concatenate([image, memory[:-3]])
         mean = image if memory is None else _IMAGE_LEAK * memory[3:] + (1.0 - _IMAGE_LEAK) * image
         return np.concatenate([image, mean])
     for key in ("zfc_map", "true_map"):
@@ -71,11 +77,13 @@ def remember(memory: Memory | None, obs: Mapping[str, Any]) -> Memory | None:
     return None
 
 
-def network_inputs(obs: Mapping[str, Any], memory: Memory | None) -> dict[str, NDArray[Any]]:
+def network_inputs(obs: Mapping[str, Any], memory: Memory | None, learner: Configuration) -> dict[str, NDArray[Any]]:
     """What the networks get, an element of ``input_space``, with the memory that includes the observation."""
     inputs: dict[str, NDArray[Any]] = {"vector": _vector(obs["fixation"], obs["proprio"])}
     if memory is not None:
         levels = memory if "rgb" in obs else 128.0 + 127.0 * memory
+        if "rgb" in obs and learner.image_frames:
+            levels = levels.reshape(-1, 3, *levels.shape[1:])[::PERIODS].reshape(-1, *levels.shape[1:])
         inputs["view"] = np.clip(np.rint(levels), 0.0, 255.0).astype(np.uint8)
     return inputs
 

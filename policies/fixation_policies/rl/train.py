@@ -23,7 +23,7 @@ from fixation_policies.rl.agent_file import AgentCard, write_agent
 from fixation_policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
 from fixation_policies.rl.config import TrainConfig
 from fixation_policies.rl.environments import closing, draw_new_scenes, start_workers, worker_deaths
-from fixation_policies.rl.hyperparameters import PPO_SETTINGS, SAC_SETTINGS
+from fixation_policies.rl.hyperparameters import settings_of
 from fixation_policies.rl.overlap import BusyEnvs, learn_meanwhile
 from fixation_policies.rl.validation import validate
 from fixation_policies.rl.watch import Watch
@@ -82,8 +82,9 @@ def summary_of(config: TrainConfig, progress: Progress) -> dict[str, Any]:
 def make_model(config: TrainConfig, envs: VecEnv, out: Path | None) -> BaseAlgorithm:
     """A new SB3 model with this project's settings; TensorBoard logs go to ``out``."""
     log = None if out is None else str(out / TENSORBOARD_FOLDER)
+    settings = settings_of(config.algorithm, config.learner)
     if config.algorithm == "ppo":
-        return PPO("MultiInputPolicy", envs, seed=config.seed, tensorboard_log=log, device="cpu", **PPO_SETTINGS)
+        return PPO("MultiInputPolicy", envs, seed=config.seed, tensorboard_log=log, device="cpu", **settings)
     return SAC(
         "MultiInputPolicy",
         envs,
@@ -92,7 +93,7 @@ def make_model(config: TrainConfig, envs: VecEnv, out: Path | None) -> BaseAlgor
         device="cpu",
         buffer_size=config.buffer_size,
         learning_starts=config.learning_starts,
-        **SAC_SETTINGS,
+        **settings,
     )
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fixation_policies.rl.decisions import PERIODS
 from fixation_policies.rl.hyperparameters import GAMMA, PPO_SETTINGS
+from fixation_policies.rl.inputs import PERIODS
 
 _COMMON: dict[str, Any] = {**PPO_SETTINGS, "policy": "MultiInputPolicy", "n_envs": 4}
 hyperparams: dict[str, dict[str, Any]] = {

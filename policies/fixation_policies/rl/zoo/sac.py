@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fixation_policies.rl.decisions import PERIODS
 from fixation_policies.rl.hyperparameters import GAMMA, SAC_SETTINGS
+from fixation_policies.rl.inputs import PERIODS
 
 _COMMON: dict[str, Any] = {
     **SAC_SETTINGS,
