@@ -20,6 +20,7 @@ from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.types import Observation
 from fixation_policies.rl.agent_file import AgentCard, read_card
+from fixation_policies.rl.config import CONFIGS
 
 settings.register_profile(
     "same every time",
@@ -199,10 +200,10 @@ def test_agent_cards(values, cut, tmp_path):
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as file:
         file.writestr("agent.json", json.dumps(values))
-        file.writestr("actor.pth", b"")
+        file.writestr("actor.npz", b"")
     path = tmp_path / "agent.zip"
     path.write_bytes(packed.getvalue()[:cut])
     card = works_or_says(UsageError, lambda: read_card(path))
     if card is not None:
-        assert card.config in ("zfc", "blind", "rgb", "privileged", "residual")
+        assert card.config in CONFIGS
         works_or_says(UsageError, cli.Evaluate(policy=str(path)).check)

@@ -22,7 +22,7 @@ from fixation_policies.base import Policy
 from fixation_policies.baselines import RandomPolicy
 from fixation_policies.paper import PAPER_NAMES, paper_variant
 from fixation_policies.rl.agent_file import read_card
-from fixation_policies.rl.config import CONFIGS, require_learning_packages
+from fixation_policies.rl.config import CONFIGS
 from fixation_policies.servo.servo_policy import ServoPolicy
 from fixation_policies.servo.variants import VARIANT_NAMES, ServoVariant, servo_variant
 
@@ -53,7 +53,6 @@ def check_policy(name: str) -> None:
     """
     if name.endswith(AGENT_SUFFIX):
         read_card(Path(name))
-        require_learning_packages()
     elif name in POLICY_NAMES:
         return
     elif is_class_name(name):

@@ -7,17 +7,20 @@ import zipfile
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import pytest
-import torch
 
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
 from fixation_policies import agents
 from fixation_policies.catalogue import surroundings
 from fixation_policies.rl.agent_file import AgentCard, read_agent, read_card, write_agent
+from fixation_policies.rl.config import CONFIGS
+from fixation_policies.rl.network import weight_shapes
 
 CARD = AgentCard("zfc", "sac", (96, 128), "mixed", 3, 1000, 9000, {"torch": "2"})
-WEIGHTS = {"layer.weight": torch.arange(6.0).reshape(2, 3)}
+SHAPES = weight_shapes("sac", CONFIGS["zfc"], 4)
+WEIGHTS = {name: np.random.default_rng(0).normal(size=shape).astype(np.float32) for name, shape in SHAPES.items()}
 
 
 @pytest.fixture
@@ -38,7 +41,8 @@ def rewrite(path, **members):
 def test_what_is_written_is_read(agent):
     card, weights = read_agent(agent)
     assert card == read_card(agent) == CARD
-    assert torch.equal(weights["layer.weight"], WEIGHTS["layer.weight"])
+    assert set(weights) == set(WEIGHTS)
+    assert all(np.array_equal(weights[name], WEIGHTS[name]) for name in WEIGHTS)
     assert os.listdir(agent.parent) == ["agent.zip"]
 
 
@@ -65,7 +69,7 @@ def damage_no_zip(path):
 def damage_foreign(path):
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("data", "{}")
-        file.writestr("policy.pth", b"")
+        file.writestr("policy.npz", b"")
 
 
 def damage_other_version(path):
@@ -77,7 +81,7 @@ def damage_other_version(path):
 def damage_flipped(path):
     data = bytearray(path.read_bytes())
     with zipfile.ZipFile(path) as file:
-        begin = file.getinfo("actor.pth").header_offset + 50
+        begin = file.getinfo("actor.npz").header_offset + 50
     data[begin : begin + 40] = bytes(byte ^ 0xFF for byte in data[begin : begin + 40])
     path.write_bytes(data)
 
@@ -117,6 +121,28 @@ def test_evaluate_says_in_one_line_what_is_wrong_with_a_file(agent, damage, mess
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("change", [{"mu.bias": np.zeros(5, np.float32)}, {"mu.bias": None}])
+def test_weights_of_another_network_are_refused(agent, change):
+    weights = {name: array for name, array in {**WEIGHTS, **change}.items() if array is not None}
+    write_agent(agent, CARD, weights)
+    with pytest.raises(UsageError, match="does not hold the weights of a sac agent; train it again"):
+        read_agent(agent)
+
+
+def test_a_file_of_format_1_has_the_weights_of_pytorch(agent):
+    import torch
+
+    with zipfile.ZipFile(agent) as file:
+        card = json.loads(file.read("agent.json"))
+    packed = io.BytesIO()
+    torch.save({name: torch.tensor(array) for name, array in WEIGHTS.items()}, packed)
+    with zipfile.ZipFile(agent, "w") as file:
+        file.writestr("agent.json", json.dumps({**card, "format": 1}))
+        file.writestr("actor.pth", packed.getvalue())
+    _, weights = read_agent(agent)
+    assert all(np.array_equal(weights[name], WEIGHTS[name]) for name in WEIGHTS)
+
+
 class Evil:
     def __reduce__(self):
         return (os.mkdir, ("executed",))
@@ -125,8 +151,8 @@ class Evil:
 def test_weights_cannot_execute_anything(agent, monkeypatch):
     monkeypatch.chdir(agent.parent)
     buffer = io.BytesIO()
-    torch.save({"a": Evil()}, buffer)
-    rewrite(agent, **{"actor.pth": buffer.getvalue()})
+    np.savez(buffer, allow_pickle=True, **{**WEIGHTS, "mu.bias": np.array([Evil()] * 4, object)})
+    rewrite(agent, **{"actor.npz": buffer.getvalue()})
     with pytest.raises(UsageError, match="damaged"):
         read_agent(agent)
     assert not (agent.parent / "executed").exists()

@@ -84,12 +84,11 @@ class MadeUpNetwork:
     def __init__(self):
         self.calls = 0
 
-    def predict(self, inputs, deterministic):
-        assert deterministic
+    def __call__(self, inputs):
         self.calls += 1
         trigger = 1.0 if self.calls % 7 == 0 else -1.0
         level = inputs["view"].mean(axis=(1, 2)) / 255.0
-        return np.array([*level, inputs["vector"].mean() / 10.0, trigger], np.float32), None
+        return np.array([*level, inputs["vector"].mean() / 10.0, trigger], np.float32)
 
 
 def test_an_agent_acts_at_the_control_rate_as_the_learner_did_by_decisions():
@@ -97,7 +96,7 @@ def test_an_agent_acts_at_the_control_rate_as_the_learner_did_by_decisions():
     env, network = DecisionEnv(trained), MadeUpNetwork()
     inputs, _ = env.reset(seed=0)
     for _ in range(20):
-        inputs, *_ = env.step(network.predict(inputs, deterministic=True)[0])
+        inputs, *_ = env.step(network(inputs))
 
     decider = Decider(MadeUpNetwork(), 4, CONFIGS["zfc"])
     obs, _ = used.reset(seed=0)

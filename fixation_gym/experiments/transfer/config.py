@@ -14,7 +14,7 @@ from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation.config import SEED_BLOCK, check_scenarios, check_seed, episode_seeds
 from fixation_gym.experiments.transfer.shifts import AXES, NONE, SEVERITIES, Shift, shift
 from fixation_gym.names import Names
-from fixation_policies.rl.config import CONFIGS, TrainConfig, require_learning_packages
+from fixation_policies.rl.config import CONFIGS, TrainConfig
 
 if TYPE_CHECKING:
     from fixation_gym.experiments.runner import Cell
@@ -125,7 +125,6 @@ class TransferConfig:
         from fixation_policies.rl.agent_file import read_card
 
         card = read_card(path)
-        require_learning_packages()
         if card.scenario != self.scenario:
             raise UsageError(f"{path} was trained on {card.scenario}; --agent takes those trained on {self.scenario}")
 

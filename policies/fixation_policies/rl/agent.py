@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from gymnasium import spaces
 from numpy.typing import NDArray
-from stable_baselines3.common.policies import MultiInputActorCriticPolicy
-from stable_baselines3.common.utils import ConstantSchedule
-from stable_baselines3.sac.policies import MultiInputPolicy
 
 from fixation_gym.control.open_loop import Stage
 from fixation_gym.envs.zfc_observation import OBSERVATIONS
@@ -23,7 +20,6 @@ from fixation_policies.base import Action, Estimate
 from fixation_policies.rl.agent_file import AgentCard, read_agent
 from fixation_policies.rl.config import CONFIGS, Configuration
 from fixation_policies.rl.decisions import env_action
-from fixation_policies.rl.hyperparameters import settings_of
 from fixation_policies.rl.inputs import (
     PERIODS,
     STAGE,
@@ -31,21 +27,23 @@ from fixation_policies.rl.inputs import (
     Memory,
     blind_stage,
     busy,
-    input_space,
     network_inputs,
     remember,
 )
+from fixation_policies.rl.network import action
 from fixation_policies.rl.residual import ResidualServo
 from fixation_policies.servo.servo_policy import ServoPolicy
 
+Network = Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float32]]
+"""Action for what it sees, an element of ``inputs.input_space``."""
 _STAGES = tuple(stage.value for stage in Stage)
 
 
 class Decider:
     """A network with the clock and the memory that it was trained with."""
 
-    def __init__(self, network: Any, size: int, learner: Configuration) -> None:
-        """Use an SB3 policy that gives actions of this size, and was trained with this configuration."""
+    def __init__(self, network: Network, size: int, learner: Configuration) -> None:
+        """Use a network that gives actions of this size, and was trained with this configuration."""
         self._network, self._size, self._learner = network, size, learner
         self.reset()
 
@@ -65,8 +63,7 @@ class Decider:
             self._periods = 0  # the first action after a manoeuvre is a new one
         else:
             if self._periods % PERIODS == 0:
-                inputs = network_inputs(obs, self._memory, self._learner)
-                self._action = self._network.predict(inputs, deterministic=True)[0]
+                self._action = self._network(network_inputs(obs, self._memory, self._learner))
             self._periods += 1
         return self._action
 
@@ -129,8 +126,7 @@ def load_agent(path: Path, env: Any) -> Agent | ResidualAgent:
     card, weights = read_agent(path)
     learner = CONFIGS[card.config]
     _check_observation(path, card, learner, env.observation_space)
-    size = 2 if learner.residual else 4
-    decider = Decider(_network(path, card, learner, size, weights), size, learner)
+    decider = Decider(partial(action, card.algorithm, learner, weights), 2 if learner.residual else 4, learner)
     if not learner.residual:
         return Agent(card, decider)
     from fixation_policies.catalogue import make_policy
@@ -152,22 +148,3 @@ def _check_observation(path: Path, card: AgentCard, learner: Configuration, spac
         allowed = f'FixationPickZFC-v0 with observation="{learner.observation}"'
         assert learner.observation in OBSERVATIONS
         raise UsageError(f"{path} is an agent of configuration {card.config}: it acts in {allowed}")
-
-
-def _network(path: Path, card: AgentCard, learner: Configuration, size: int, weights: dict[str, Any]) -> Any:
-    """The network with these weights; SB3's policy class around it prepares the inputs and scales the outputs."""
-    torch.set_num_threads(1)  # a single input: threads cost more than they gain
-    inputs, actions = input_space(learner), spaces.Box(-1.0, 1.0, (size,), np.float32)
-    arguments = settings_of(card.algorithm, learner)["policy_kwargs"]
-    if card.algorithm == "ppo":
-        policy = MultiInputActorCriticPolicy(inputs, actions, ConstantSchedule(0.0), **arguments)
-        target = policy
-    else:
-        policy = MultiInputPolicy(inputs, actions, ConstantSchedule(0.0), **arguments)
-        target = policy.actor
-    try:
-        target.load_state_dict(weights)
-    except (RuntimeError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"{path} does not hold the weights of a {card.algorithm} agent; train it again") from error
-    policy.set_training_mode(False)
-    return policy

@@ -12,6 +12,10 @@ from fixation_gym.errors import UsageError, check_names
 
 Convolution = tuple[int, int, int]
 """(channels, size of the kernel, stride)"""
+VIEW_FEATURES, HIDDEN = 64, 256
+"""Sizes of a network's layers: what the view comes to, and each of the two between features and action."""
+UNKNOWN = 128.0 / 255.0
+"""Of a map, among pixels within 0..1; networks see twice the difference from it."""
 
 
 @dataclass(frozen=True)
@@ -139,5 +143,5 @@ def require_learning_packages() -> None:
     for package in ("torch", "stable_baselines3", "tensorboard"):
         if importlib.util.find_spec(package) is None:
             raise UsageError(
-                f"agents need the package {package}, which is not installed: pip install 'fixation-gym[rl]'"
+                f"training needs the package {package}, which is not installed: pip install 'fixation-gym[rl]'"
             )

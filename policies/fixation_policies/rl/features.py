@@ -10,10 +10,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn
 
 from fixation_policies.rl.augmentation import jittered, shifted
-from fixation_policies.rl.config import Configuration, Convolution
-
-UNKNOWN = 128.0 / 255.0
-"""Of a map."""
+from fixation_policies.rl.config import UNKNOWN, VIEW_FEATURES, Configuration, Convolution
 
 
 class JoinedFeatures(BaseFeaturesExtractor):
@@ -35,7 +32,7 @@ class JoinedFeatures(BaseFeaturesExtractor):
         vector = observation_space["vector"].shape
         assert vector is not None
         view = observation_space["view"].shape if "view" in observation_space.spaces else None
-        super().__init__(observation_space, features_dim=vector[0] + (0 if view is None else 64))
+        super().__init__(observation_space, features_dim=vector[0] + (0 if view is None else VIEW_FEATURES))
         self.view = None if view is None else _cnn(view[0], view[1], view[2], convolutions)
         self._augmented = augmented
 
@@ -56,5 +53,5 @@ def _cnn(channels: int, height: int, width: int, convolutions: Sequence[Convolut
     for features, size, stride in convolutions:
         layers += [nn.Conv2d(channels, features, size, stride=stride), nn.ReLU()]
         channels, height, width = features, (height - size) // stride + 1, (width - size) // stride + 1
-    dense = nn.Linear(channels * height * width, 64)
-    return nn.Sequential(*layers, nn.Flatten(), dense, nn.LayerNorm(64), nn.Tanh())
+    dense = nn.Linear(channels * height * width, VIEW_FEATURES)
+    return nn.Sequential(*layers, nn.Flatten(), dense, nn.LayerNorm(VIEW_FEATURES), nn.Tanh())

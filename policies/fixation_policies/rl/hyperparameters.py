@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fixation_policies.rl.config import Configuration
+from fixation_policies.rl.config import HIDDEN, Configuration
 from fixation_policies.rl.features import JoinedFeatures
 
 GAMMA = 0.98
@@ -18,7 +18,7 @@ SAC_SETTINGS: dict[str, Any] = {
     "train_freq": 1,
     "gradient_steps": 0,  # those of fixation_policies.rl.overlap take place while the environments step
     "ent_coef": "auto_0.1",
-    "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256]},
+    "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [HIDDEN, HIDDEN]},
 }
 PPO_SETTINGS: dict[str, Any] = {
     "gamma": GAMMA,
@@ -28,7 +28,7 @@ PPO_SETTINGS: dict[str, Any] = {
     "n_epochs": 10,
     "gae_lambda": 0.95,
     "ent_coef": 0.002,
-    "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [256, 256], "log_std_init": -0.5},
+    "policy_kwargs": {"features_extractor_class": JoinedFeatures, "net_arch": [HIDDEN, HIDDEN], "log_std_init": -0.5},
 }
 
 

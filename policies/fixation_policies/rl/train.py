@@ -24,6 +24,7 @@ from fixation_policies.rl.checkpoints import Progress, latest_checkpoint, load_m
 from fixation_policies.rl.config import TrainConfig
 from fixation_policies.rl.environments import closing, draw_new_scenes, start_workers, worker_deaths
 from fixation_policies.rl.hyperparameters import settings_of
+from fixation_policies.rl.network import Weights, acting_weights
 from fixation_policies.rl.overlap import BusyEnvs, learn_meanwhile
 from fixation_policies.rl.validation import validate
 from fixation_policies.rl.watch import Watch
@@ -97,9 +98,10 @@ def make_model(config: TrainConfig, envs: VecEnv, out: Path | None) -> BaseAlgor
     )
 
 
-def agent_weights(model: BaseAlgorithm) -> dict[str, Any]:
+def agent_weights(config: TrainConfig, model: BaseAlgorithm) -> Weights:
     """What acting needs of a model."""
-    return (model.actor if isinstance(model, SAC) else model.policy).state_dict()
+    weights = (model.actor if isinstance(model, SAC) else model.policy).state_dict()
+    return acting_weights(config.algorithm, config.learner, {name: value.numpy() for name, value in weights.items()})
 
 
 def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Progress) -> None:
@@ -126,7 +128,7 @@ def _learn(config: TrainConfig, out: Path, checkpoint: Path | None, progress: Pr
             busy.meanwhile = None
             _evaluate(config, out, model, envs, progress)
             # Before the checkpoint: a run that has its last one has an agent, too.
-            write_agent(out / FINAL_FILE, card_of(config, progress), agent_weights(model))
+            write_agent(out / FINAL_FILE, card_of(config, progress), agent_weights(config, model))
             save()
 
 
@@ -145,7 +147,7 @@ def _evaluate(config: TrainConfig, out: Path, model: BaseAlgorithm, envs: VecEnv
         **measures,
     }
     if all(rank(entry) > rank(earlier) for earlier in progress.curve):
-        write_agent(out / BEST_FILE, card_of(config, progress), agent_weights(model))
+        write_agent(out / BEST_FILE, card_of(config, progress), agent_weights(config, model))
     progress.curve.append(entry)
     progress.spend("evaluating", time.monotonic() - started)
     for name, value in measures.items():
