@@ -2,9 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.stats import trim_mean
+from scipy.stats import trim_mean, ttest_1samp
 
-from fixation_policies.rl.aggregates import bootstrap_interval, interquartile_mean
+from fixation_policies.rl.aggregates import (
+    bootstrap_interval,
+    interquartile_mean,
+    probability_of_improvement,
+    student_interval,
+)
 
 
 def test_the_interquartile_mean_leaves_out_a_quarter_at_each_end():
@@ -32,6 +37,19 @@ def test_the_interval_of_a_mean_is_the_textbook_one():
     half = 1.96 * scores.std() / 20
     assert low == pytest.approx(scores.mean() - half, abs=0.1 * half)
     assert high == pytest.approx(scores.mean() + half, abs=0.1 * half)
+
+
+def test_students_interval_is_that_of_scipy_and_needs_two():
+    differences = np.random.default_rng(2).normal(0.1, 0.2, 5)
+    assert student_interval(differences) == pytest.approx(ttest_1samp(differences, 0.0).confidence_interval(0.95))
+    with pytest.raises(ValueError, match="two differences or more, got 1"):
+        student_interval(np.array([0.1]))
+
+
+def test_the_probability_of_improvement_counts_pairs_of_runs():
+    ours, theirs = np.array([0.5, 0.7, 0.9]), np.array([0.5, 0.6])
+    assert probability_of_improvement(ours, theirs) == pytest.approx((0.5 + 0 + 1 + 1 + 1 + 1) / 6)
+    assert probability_of_improvement(ours, ours) == 0.5
 
 
 @pytest.mark.parametrize("scores", [np.zeros(3), np.zeros((0, 2))])

@@ -48,6 +48,8 @@ def test_tables_and_curves_are_the_aggregates_of_the_runs(tmp_path):
     difference = next(row for row in summary["differences"] if row["scenario"] == "mixed")
     assert (difference["config"], difference["minus"], difference["seeds"]) == ("zfc", "blind", 4)
     assert difference["success"] == difference["success_low"] == difference["success_high"] == pytest.approx(0.3)
+    assert (difference["success_t_low"], difference["success_t_high"]) == pytest.approx((0.3, 0.3))
+    assert difference["success_improved"] == 1.0
     point = next(point for point in summary["curves"] if point["config"] == "blind" and point["decisions"] == 2)
     assert (point["env_steps"], point["wall_min"], point["success"]) == (19.5, 2.0, pytest.approx(0.2))
     assert SERVO not in {point["config"] for point in summary["curves"]}

@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.evaluation.statistics import wilson_interval
-from fixation_policies.rl.aggregates import bootstrap_interval, interquartile_mean
+from fixation_policies.rl.aggregates import (
+    bootstrap_interval,
+    interquartile_mean,
+    probability_of_improvement,
+    student_interval,
+)
 
 CURVES_FILE, TABLE_FILE, DIFFERENCES_FILE, FIGURE_FILE = "curves.csv", "table.csv", "differences.csv", "comparison.png"
 MEASURES = {"success": "successes", "collision_free": "collision_free_successes"}
@@ -67,7 +72,8 @@ def table_of(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 def differences_of(results: Sequence[dict[str, Any]], reference: str) -> list[dict[str, Any]]:
     """One row per other learner and scenario: rates of ``reference`` minus its own, paired by seed.
 
-    Means over the seeds that both have, with intervals of the bootstrap over them; one seed has no interval, so no row.
+    Means over the seeds that both have, with intervals of the bootstrap over them and, as ``_t_low`` and ``_t_high``,
+    of Student; ``_improved`` is the probability of improvement. One seed has no interval, so no row.
     """
     runs = {(result["config"], result["seed"]): result["scenarios"] for result in results if result["curve"]}
     rows = []
@@ -81,8 +87,7 @@ def differences_of(results: Sequence[dict[str, Any]], reference: str) -> list[di
                 ours, theirs = (
                     _rates([runs[config, seed] for seed in seeds], [name], count) for config in (reference, other)
                 )
-                low, high = bootstrap_interval(ours - theirs, lambda scores: float(np.mean(scores)))
-                row |= {measure: float(np.mean(ours - theirs)), f"{measure}_low": low, f"{measure}_high": high}
+                row |= _difference(measure, ours, theirs)
             rows.append(row)
     return rows
 
@@ -118,6 +123,19 @@ def _configs(results: Sequence[dict[str, Any]]) -> list[str]:
 def _rates(runs: Sequence[dict[str, Any]], scenarios: Sequence[str], count: str) -> np.ndarray:
     """Rates of runs in scenarios, shape (runs, scenarios)."""
     return np.array([[run[scenario][count] / run[scenario]["episodes"] for scenario in scenarios] for run in runs])
+
+
+def _difference(measure: str, ours: np.ndarray, theirs: np.ndarray) -> dict[str, float]:
+    low, high = bootstrap_interval(ours - theirs, lambda scores: float(np.mean(scores)))
+    t_low, t_high = student_interval(ours - theirs)
+    return {
+        measure: float(np.mean(ours - theirs)),
+        f"{measure}_low": low,
+        f"{measure}_high": high,
+        f"{measure}_t_low": t_low,
+        f"{measure}_t_high": t_high,
+        f"{measure}_improved": probability_of_improvement(ours, theirs),
+    }
 
 
 def _aggregate(measure: str, scores: np.ndarray) -> dict[str, float]:
