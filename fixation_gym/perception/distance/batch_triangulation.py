@@ -63,7 +63,13 @@ def _solved(state: CalibratingState, rows: FloatArray, depth: float) -> tuple[Fl
             return -np.concatenate([(whiten @ by_unknowns).reshape(-1, len(unknowns)), whiten_prior])
 
         found = least_squares(
-            residuals, mean, jacobian, (lowest, np.inf), x_scale="jac", loss="soft_l1", f_scale=_ROBUST_FROM
+            residuals,
+            mean,
+            jacobian,  # pyright: ignore[reportArgumentType]  # SciPy takes functions, too
+            (lowest, np.inf),
+            x_scale="jac",
+            loss="soft_l1",
+            f_scale=_ROBUST_FROM,
         )
         mean, cost = found.x, float(found.cost)
         cov = np.linalg.inv(found.jac.T @ found.jac)
