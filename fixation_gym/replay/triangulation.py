@@ -39,7 +39,7 @@ def sight_of(look: Look, settings: CalibratingSettings) -> Sight:
 def triangulation_summary(sights: Sequence[Sight], settings: CalibratingSettings) -> dict[str, Any] | None:
     """Errors against truth, as of the estimates, and the calibration that was found, JSON-able.
 
-    None if the target was seen in fewer than two pictures.
+    None if the target was never seen.
     """
     started = time.perf_counter()
     sightings = _with_twists(sights)

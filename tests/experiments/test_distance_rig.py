@@ -12,6 +12,7 @@ from fixation_gym.envs.sensor_noise import SENSOR_NOISE
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, HOME, INTRINSICS, Condition
 from fixation_gym.geometry.rigid import inverse, look_at, transform
 from fixation_gym.perception.detection.colour import segment
+from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
 from fixation_gym.perception.distance.estimator import TwistEstimator
 from fixation_gym.perception.distance.flat_target import coverage, flat_centroid
 from fixation_gym.perception.distance.pose_filter import DistanceSettings
@@ -109,6 +110,9 @@ def test_the_same_seed_gives_the_same_recording(rig, monkeypatch: pytest.MonkeyP
     condition = Condition(0.66, 0.05, "fixation", 0.1, 0)
     noise = replace(SENSOR_NOISE["nominal"])
     made = [recording.record(rig, condition, noise, np.random.default_rng(7)) for _ in range(2)]
-    tracks = [estimates.run(one, estimates.Method("pose", recording.calibrating(noise, 0.5))) for one in made]
+    tracks = [
+        estimates.run(one, estimates.Method("pose", CalibratingEstimator(recording.calibrating_settings(noise, 0.5))))
+        for one in made
+    ]
     np.testing.assert_array_equal(tracks[0].robot, tracks[1].robot)
     np.testing.assert_array_equal(made[0].frames[-1].seen.T_base_cam, made[1].frames[-1].seen.T_base_cam)

@@ -74,10 +74,12 @@ def test_a_tenth_of_wrong_centroids_hardly_moves_it():
     assert np.median(np.abs(error)) < 0.02
 
 
-def test_it_needs_two_sights_and_leaves_out_pictures_without_one():
+def test_it_leaves_out_pictures_without_the_target_and_one_sight_gives_the_first_guess():
     seen, _ = sightings(10)
     blind = [replace(sighting, centroid=None) for sighting in seen]
     assert triangulate(blind, SETTINGS) is None
-    assert triangulate([*blind, seen[0]], SETTINGS) is None
+    guess = distance_at(triangulate([*blind, seen[0]], SETTINGS), seen[0])
+    assert guess.lens == pytest.approx(SETTINGS.initial_distance_m, rel=0.05)
+    assert guess.lens_std > 0.25
     with_gaps = triangulate([*seen, *blind], SETTINGS)
     np.testing.assert_allclose(with_gaps.mean, triangulate(seen, SETTINGS).mean)

@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 
 from fixation_gym.envs.sensor_noise import SensorNoise
-from fixation_gym.experiments.distance.recording import Recording, calibrating
+from fixation_gym.experiments.distance.recording import Recording, calibrating_settings
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, CYCLE_RATE, INTRINSICS
 from fixation_gym.geometry.rigid import transform
 from fixation_gym.geometry.twist import skew
 from fixation_gym.perception.detection.segmentation import Segmentation
 from fixation_gym.perception.distance import flow_filters, pose_filter
+from fixation_gym.perception.distance.batch_triangulation import triangulate
+from fixation_gym.perception.distance.calibrating_estimator import CalibratingEstimator
+from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings, CalibratingState, distance_at
+from fixation_gym.perception.distance.calibration_model import Sighting
 from fixation_gym.perception.distance.estimator import DistanceEstimator, Frames, PoseEstimator
 from fixation_gym.perception.distance.fixation_constraint import gaze_drift
 from fixation_gym.perception.distance.flow_filters import FlowFilterSettings, Kind
@@ -26,6 +30,8 @@ from fixation_gym.types import FloatArray
 
 ONSET_TOLERANCE, JUMP_TOLERANCE = 0.03, 0.05
 """Relative errors that count as settled after the onset of motion and after the jump."""
+_TRIANGULATE_EVERY = 12
+"""Frames after which the triangulation is made again: half a second."""
 
 
 class RecordedFlow:
@@ -73,6 +79,43 @@ class RecordedFlow:
         return Fixation(visible, np.array(centroid), point, depth, std, 2.0 * self._state.nis, True)
 
 
+class RecordedTriangulation:
+    """One triangulation of all centroids so far, made again every few frames."""
+
+    def __init__(self, settings: CalibratingSettings) -> None:
+        """Start without knowledge."""
+        self._settings = settings
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._sightings: list[Sighting] = []
+        self._state: CalibratingState | None = None
+
+    def add_frame(self, frame: Frame) -> None:
+        """Keep a frame; every few of them the triangulation is made again."""
+        assert frame.rig is not None
+        seen = frame.segmentation
+        centroid = seen.centroid if seen.visible else None
+        self._sightings.append(Sighting(frame.T_base_cam, frame.rig.pose_cov, frame.camera_twist, centroid))
+        if self._state is None or len(self._sightings) % _TRIANGULATE_EVERY == 0:
+            self._state = triangulate(self._sightings, self._settings)
+
+    def add_flow(self, flow: Flow, frames: Frames) -> None:
+        """Flow is not used."""
+
+    def fixation(self, T_base_cam: FloatArray, seen: Segmentation | None) -> Fixation:
+        """What is known of the target, for the camera of the last frame."""
+        prior = DistanceSettings(self._settings.initial_distance_m, self._settings.initial_relative_std)
+        if self._state is None:
+            return pose_filter.fixation_at(None, T_base_cam, prior)
+        found = distance_at(self._state, self._sightings[-1])
+        state = DistanceState(self._state.T_base_anchor, self._state.mean[:3], self._state.cov[:3, :3])
+        fixation = pose_filter.fixation_at(state, T_base_cam, prior)
+        depths = {"distance_m": found.robot, "distance_std_m": found.robot_std, "lens": (found.lens, found.lens_std)}
+        return replace(fixation, **depths)
+
+
 def follow_unguarded(
     state: DistanceState | None, before: Frame | None, now: Frame, settings: DistanceSettings
 ) -> tuple[DistanceState | None, bool]:
@@ -93,7 +136,8 @@ class Method:
     """An estimator and its name in the results."""
 
     name: str
-    """"hard", "free", "pose", or "pose3": the three-state filter of the pick task with its own settings."""
+    """"hard", "free", "pose", "batch": a triangulation with the unknowns of "pose", "pose3": the three-state filter of
+    the pick task with its own settings."""
     estimator: DistanceEstimator
     flow: FlowName | None = None
     """Which flow it uses, if any."""
@@ -109,8 +153,9 @@ def methods(recording: Recording, noise: SensorNoise) -> tuple[Method, ...]:
     exact = replace(noise, hand_eye_m=0.0, hand_eye_rad=0.0)
     return (
         *(Method(kind, RecordedFlow(kind, flow, settings), flow) for kind in kinds for flow in FLOW_NAMES),
-        Method("pose", calibrating(noise, guess)),
-        Method("pose", calibrating(exact, guess), hand_eye=False),
+        Method("pose", CalibratingEstimator(calibrating_settings(noise, guess))),
+        Method("pose", CalibratingEstimator(calibrating_settings(exact, guess)), hand_eye=False),
+        Method("batch", RecordedTriangulation(calibrating_settings(noise, guess))),
         Method("pose3", PoseEstimator(DistanceSettings(initial_distance_m=guess), follow_unguarded)),
     )
 

@@ -85,9 +85,9 @@ class Recording:
         return self.frames[1].seen.time - self.frames[0].seen.time
 
 
-def calibrating(noise: SensorNoise, first_guess_m: float) -> CalibratingEstimator:
-    """The estimator on poses and centroids for a sensor noise preset."""
-    settings = CalibratingSettings(
+def calibrating_settings(noise: SensorNoise, first_guess_m: float) -> CalibratingSettings:
+    """What estimators on poses and centroids expect of a sensor noise preset."""
+    return CalibratingSettings(
         initial_distance_m=first_guess_m,
         centroid_std=CENTROID_STD_PX / INTRINSICS.fx,
         centroid_std_size=0.0,  # the centroid of a flat print of known normal has no error that grows with its size
@@ -95,7 +95,6 @@ def calibrating(noise: SensorNoise, first_guess_m: float) -> CalibratingEstimato
         hand_eye_rad=noise.hand_eye_rad,
         image_age_s=noise.image_latency_s,
     )
-    return CalibratingEstimator(settings)
 
 
 class _Sensors:
@@ -167,7 +166,7 @@ def record(rig: PrintRig, condition: Condition, noise: SensorNoise, rng: np.rand
     """Run one sequence on the simulated arm."""
     circle = Circle(condition, rng)
     first_guess = condition.distance_m * 2.0 ** rng.uniform(-1.0, 1.0)
-    estimator = calibrating(noise, first_guess)
+    estimator = CalibratingEstimator(calibrating_settings(noise, first_guess))
     target = condition.print_position()
     start = circle.at(0.0)[0]
     ahead = target if condition.motion == "fixation" else start + HOME[:3, 2]

@@ -24,7 +24,7 @@ WANTED = (
     (6.6, 0.05, 0.066, 0.200),
 )
 """Distance, amplitude, goal and floor of the mean absolute error of "pose" when fixating, all in m."""
-_BOUNDS = {"hard": "velocity_hard", "free": "velocity_free", "pose": "pose", "pose3": "pose"}
+_BOUNDS = {"hard": "velocity_hard", "free": "velocity_free", "pose": "pose", "batch": "pose", "pose3": "pose"}
 
 
 def summarise(cells: Sequence[Cell], noise: str) -> dict[str, Any]:
@@ -144,7 +144,7 @@ def motion_ratios(cells: Sequence[Cell]) -> list[Row]:
     """
     ratios = []
     conditions = sorted({(cell["distance_m"], cell["amplitude_m"]) for cell in cells})
-    pairs = [("pose", None, "pose"), ("pose3", None, "pose3")]
+    pairs = [(name, None, name) for name in ("pose", "batch", "pose3")]
     flows = ("gradient", "warped", "dis")
     pairs += [(kind, flow, "free") for kind in ("hard", "free") for flow in flows]
     for distance, amplitude in conditions:

@@ -25,14 +25,14 @@ _ROBUST_FROM = 2.0
 
 
 def triangulate(sightings: Sequence[Sighting], settings: CalibratingSettings) -> CalibratingState | None:
-    """The most probable target and calibration given all sightings; None if it is seen in fewer than two.
+    """The most probable target and calibration given all sightings; None if it is never seen.
 
     Args:
         sightings: in any order; those without a centroid do not count.
         settings: prior and noise.
     """
     seen = [sighting for sighting in sightings if sighting.centroid is not None]
-    if len(seen) < 2:
+    if not seen:
         return None
     state = first_state(seen[0], settings)
     rows = np.array([frame_row(state.T_base_anchor, sighting, settings.noise_of(sighting)) for sighting in seen])
@@ -65,8 +65,8 @@ def _solved(state: CalibratingState, rows: FloatArray, depth: float) -> tuple[Fl
         found = least_squares(
             residuals,
             mean,
-            jacobian,  # pyright: ignore[reportArgumentType]  # SciPy takes functions, too
-            (lowest, np.inf),
+            jacobian,  # pyright: ignore[reportArgumentType]  (SciPy's annotation knows names of methods alone)
+            bounds=(lowest, np.inf),
             x_scale="jac",
             loss="soft_l1",
             f_scale=_ROBUST_FROM,
