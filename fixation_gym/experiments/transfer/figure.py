@@ -27,7 +27,7 @@ def draw_figure(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     lines = math.ceil(len(axes) / _COLUMNS)
     figure = Figure(figsize=(12.0, 0.8 + 2.3 * lines), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(lines, _COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
+    panels = figure.subplots(lines, _COLUMNS, sharey=True, squeeze=False).ravel()
     for panel, axis in zip(panels, axes, strict=False):
         _draw_axis(panel, axis, rows)
     for panel in panels[len(axes) :]:
@@ -51,8 +51,9 @@ def _draw_axis(panel: Axes, axis: str, rows: Sequence[dict[str, Any]]) -> None:
             [100.0 * row[key] for row in points]
             for key in ("collision_free", "collision_free_low", "collision_free_high")
         )
-        seeds = points[0]["seeds"] if points else 0
-        panel.plot(x, rate, color=f"C{number}", marker="o", markersize=3, label=f"{name} ({seeds})")
+        seeds = points[0]["seeds"]
+        label = f"{name}, {seeds} seeds" if seeds > 1 else f"{name}, one run"
+        panel.plot(x, rate, color=f"C{number}", marker="o", markersize=3, label=label)
         panel.vlines(x, low, high, color=f"C{number}", linewidth=1, alpha=0.7)
     panel.set_title(axis.replace("_", " "), fontsize=9)
     panel.set_xticks(range(len(_LEVELS)), _LEVELS, fontsize=8)
