@@ -5,7 +5,16 @@ import pytest
 
 from fixation_gym.envs.zfc_observation import zfc_observation_space
 from fixation_policies.rl.config import CONFIGS
-from fixation_policies.rl.inputs import PERIODS, VIEWS, busy, input_space, learner_for, network_inputs, remember
+from fixation_policies.rl.inputs import (
+    PERIODS,
+    VIEWS,
+    busy,
+    input_space,
+    learner_for,
+    nearness_cells,
+    network_inputs,
+    remember,
+)
 
 
 def zfc_obs(cells, stage=None):
@@ -80,6 +89,18 @@ def test_inputs_are_in_their_space_for_every_configuration(learner):
         obs = space.sample()
         memory = remember(memory, obs, learner)
         assert input_space(learner).contains(network_inputs(obs, memory, learner))
+
+
+def test_cells_of_depth_show_the_nearest_thing_against_the_target():
+    depth = np.full((96, 128), 0.8, np.float32)  # twice as far as the target
+    depth[:, :64] = 0.0  # unknown
+    depth[0, 0] = 0.2  # one pixel of something near is the nearest of its cell
+    depth[48:, 64:] = 0.32
+    cells = nearness_cells(depth, 0.4)[0]
+    assert cells[0, 0] == 1.0
+    assert not cells[1:, :16].any()
+    np.testing.assert_allclose(cells[:16, 16:], -1.0)
+    np.testing.assert_allclose(cells[16:, 16:], 2.0 * (0.4 / 0.32 - 1.0), rtol=1e-6)
 
 
 def test_inputs_differ_between_configurations_only_in_the_view():

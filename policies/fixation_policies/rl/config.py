@@ -40,6 +40,7 @@ CONFIGS: dict[str, Configuration] = {
     "zfc": Configuration("zfc"),
     "blind": Configuration("blind"),
     "rgb": Configuration("rgb"),
+    "depth": Configuration("depth"),
     "privileged": Configuration("privileged"),
     "residual": Configuration("zfc", residual=True),
     "rgb_augmented": Configuration(
@@ -61,8 +62,8 @@ class TrainConfig:
 
     config: str = "zfc"
     """What the learner sees: zfc (zero-flow map), blind (no map), rgb (image), rgb_augmented (larger images, in other
-    places and colours at random), privileged (true map), or residual: the map, to add to the servo's lateral
-    velocity."""
+    places and colours at random), depth (a stereo depth camera), privileged (true map), or residual: the map, to add
+    to the servo's lateral velocity."""
     algorithm: str = "sac"
     """sac or ppo."""
     scenario: str = "mixed"

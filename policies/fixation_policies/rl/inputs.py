@@ -17,7 +17,13 @@ from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.robots import ROBOT
 from fixation_policies.rl.config import CONFIGS, Configuration
 
-VIEWS: dict[str, str | None] = {"zfc": "zfc_map", "blind": None, "rgb": "rgb", "privileged": "true_map"}
+VIEWS: dict[str, str | None] = {
+    "zfc": "zfc_map",
+    "blind": None,
+    "rgb": "rgb",
+    "depth": "depth",
+    "privileged": "true_map",
+}
 """Key of the view in the observation, by the observation's name."""
 PERIODS = 5
 """Control periods for which an action is held: 5 decisions per second."""
@@ -31,6 +37,8 @@ _LEAK = 0.97
 _GAIN = 0.25
 """A cell that is surely nearer fills the memory in four periods."""
 _IMAGE_LEAK = 0.9
+_NEARNESS_GAIN = 2.0
+"""Two thirds of the target's distance, or twice it, are as near and as far as a cell of depth can say."""
 
 Memory = NDArray[np.float32]
 """Of maps: shape (2, h, w), in [-1, 1], now and what has been seen. Of images: grey levels, shape (6, h, w), the newest
@@ -57,9 +65,9 @@ def learner_for(space: spaces.Space[Any]) -> Configuration:
 def remember(memory: Memory | None, obs: Mapping[str, Any], learner: Configuration) -> Memory | None:
     """Memory after another observation; ``memory`` is None before the first, and always without a view.
 
-    Of a map it holds the newest, centred so that unknown is 0, and evidence that adds up and fades: what one pair of
-    frames says is noisy and sparse, and things leave the image as the camera comes near. Of images it holds the
-    newest and a running mean, whose difference shows motion, or the last ones; before the first they were like it.
+    Of a map, or of depth, it holds the newest, centred so that unknown is 0, and evidence that adds up and fades: what
+    one pair of frames says is noisy and sparse, and things leave the image as the camera comes near. Of images it holds
+    the newest and a running mean, whose difference shows motion, or the last ones; before the first they were like it.
     """
     if "rgb" in obs:
         size = (learner.image_cells, learner.image_cells)
@@ -69,12 +77,36 @@ def remember(memory: Memory | None, obs: Mapping[str, Any], learner: Configurati
             return np.tile(image, (kept, 1, 1)) if memory is None else np.concatenate([image, memory[:-3]])
         mean = image if memory is None else _IMAGE_LEAK * memory[3:] + (1.0 - _IMAGE_LEAK) * image
         return np.concatenate([image, mean])
+    cells = _cells(obs)
+    if cells is None:
+        return None
+    before = np.zeros_like(cells) if memory is None else memory[1:]
+    return np.concatenate([cells, np.clip(_LEAK * before + _GAIN * cells, -1.0, 1.0)])
+
+
+def _cells(obs: Mapping[str, Any]) -> Memory | None:
+    """The newest map, or what a depth camera says in its place, shape (1, 32, 32), in [-1, 1]; above 0 is nearer."""
+    if "depth" in obs:
+        return nearness_cells(obs["depth"], float(obs["fixation"][3]))
     for key in ("zfc_map", "true_map"):
         if key in obs:
-            cells = (255.0 * obs[key] - 128.0) / np.float32(127.0)
-            before = np.zeros_like(cells) if memory is None else memory[1:]
-            return np.concatenate([cells, np.clip(_LEAK * before + _GAIN * cells, -1.0, 1.0)])
+            return (255.0 * obs[key] - 128.0) / np.float32(127.0)
     return None
+
+
+def nearness_cells(depth: NDArray[np.float32], distance_m: float) -> Memory:
+    """The nearest depth of every cell against the target's distance, shape (1, 32, 32), in [-1, 1]; 0 if unknown.
+
+    Args:
+        depth: a depth camera's picture, shape (H, W), m; 0 where it says nothing.
+        distance_m: of the target, m.
+    """
+    known = depth > 0.0
+    ratio = distance_m / np.where(known, depth, 1.0)
+    nearness = np.where(known, np.clip(_NEARNESS_GAIN * (ratio - 1.0), -1.0, 1.0), -np.inf)
+    rows, columns = (np.arange(CELLS) * length // CELLS for length in depth.shape)
+    cells = np.maximum.reduceat(np.maximum.reduceat(nearness, rows, axis=0), columns, axis=1)
+    return np.where(np.isfinite(cells), cells, 0.0)[None].astype(np.float32)
 
 
 def network_inputs(obs: Mapping[str, Any], memory: Memory | None, learner: Configuration) -> dict[str, NDArray[Any]]:
