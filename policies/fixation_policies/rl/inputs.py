@@ -81,7 +81,7 @@ def remember(memory: Memory | None, obs: Mapping[str, Any], learner: Configurati
     if cells is None:
         return None
     before = np.zeros_like(cells) if memory is None else memory[1:]
-    return np.concatenate([cells, np.clip(_LEAK * before + _GAIN * cells, -1.0, 1.0)])
+    return np.concatenate([cells, np.clip(_LEAK * before + _GAIN * cells, -1.0, 1.0).astype(np.float32)])
 
 
 def _cells(obs: Mapping[str, Any]) -> Memory | None:
