@@ -1,8 +1,8 @@
 """``run_loop``: a policy drives a robot at a steady rate, and the robot rests whatever ends that.
 
 Each period: the newest reading, the policy's answer, one command. The loop ends when the hand holds on to something,
-when the target stays out of sight, when readings stay away, or when its time is over. Then, and after any exception,
-the last command is to rest.
+when the target stays out of sight, when readings or pictures stay away, or when its time is over. Then, and after any
+exception, the last command is to rest.
 """
 
 from __future__ import annotations
@@ -81,6 +81,9 @@ class LoopSettings:
     the fingers empty opens them."""
     stale_s: float = 0.2
     """It ends when no new reading came for so long."""
+    blind_s: float = 0.5
+    """It ends when no new picture came for so long, by the pictures' stamps: what was seen last would be taken for what
+    is there."""
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
@@ -117,10 +120,16 @@ class _Marks:
 
     read: float
     """Since the last new reading."""
+    pictured: float
+    """Since the last new picture."""
     seen: float
     """Since the target was last seen, or closed fingers hid it."""
     opened: float
-    """Since the fingers were last told to open."""
+    """Since the fingers were last open, as they are until they are told to close."""
+    picture_time: float = -math.inf
+    """Stamp of the newest picture."""
+    closed: bool = False
+    """Whether the fingers were told to close, and not to open since."""
 
 
 def run_loop(
@@ -155,7 +164,7 @@ def _resting_after(robot: Robot) -> Iterator[None]:
 def _run(robot: Robot, driver: Driver, settings: LoopSettings, clock: Clock) -> LoopReport:
     period = 1.0 / settings.rate_hz
     start = due = clock.now()
-    marks, read_time = _Marks(start, start, start), -math.inf
+    marks, read_time = _Marks(start, start, start, start), -math.inf
     periods = late = 0
     while True:
         observation = robot.observe()
@@ -165,7 +174,7 @@ def _run(robot: Robot, driver: Driver, settings: LoopSettings, clock: Clock) -> 
             read_time = observation.time
             command = _checked(driver.respond(observation))
             robot.command(command)
-            marks = _marked(marks, driver.percept, command, clock.now())
+            marks = _marked(marks, observation, driver.percept, command, clock.now())
         periods += 1
         due += period
         now = clock.now()
@@ -188,22 +197,32 @@ def _checked(command: Command) -> Command:
     return command
 
 
-def _marked(marks: _Marks, percept: Percept | None, command: Command, now: float) -> _Marks:
+def _marked(marks: _Marks, observation: Observation, percept: Percept | None, command: Command, now: float) -> _Marks:
     """Marks after a reading was answered."""
-    closed = command.gripper > 0.0
+    closed = command.gripper > 0.0 or (marks.closed and command.gripper == 0.0)
     seen = closed or (percept is not None and percept.fixation.visible)
-    return _Marks(now, now if seen else marks.seen, marks.opened if closed else now)
+    taken = observation.time if observation.image_time is None else observation.image_time
+    return _Marks(
+        read=now,
+        pictured=now if taken > marks.picture_time else marks.pictured,
+        seen=now if seen else marks.seen,
+        opened=marks.opened if closed else now,
+        picture_time=max(taken, marks.picture_time),
+        closed=closed,
+    )
 
 
 def _ended(marks: _Marks, now: float, start: float, settings: LoopSettings) -> tuple[End, str] | None:
     """Why the loop ends, if it does."""
-    held, lost, stale = now - marks.opened, now - marks.seen, now - marks.read
+    held, lost, stale, blind = (now - since for since in (marks.opened, marks.seen, marks.read, marks.pictured))
     if held >= settings.hold_s:
         return End.HELD, f"the hand holds on to something, {now - start:.1f} s after the start"
     if lost >= settings.lost_s:
         return End.LOST, f"the target was not seen for {lost:.1f} s, so the robot rests; bring it into view"
     if stale >= settings.stale_s:
         return End.STALE, f"the robot gave no new reading for {stale:.2f} s, so it is told to rest"
+    if blind >= settings.blind_s:
+        return End.STALE, f"the camera gave no new picture for {blind:.2f} s, so the robot rests"
     if now - start >= settings.longest_s:
         return End.TIME, f"{settings.longest_s:g} s are over"
     return None

@@ -1,6 +1,7 @@
 """The robot loop keeps its rate and always leaves a robot that rests, by a fake clock and a fake robot."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,8 +18,8 @@ IMAGE = np.zeros((8, 8, 3), np.uint8)
 class Bench:
     """Clock and robot in one: time passes only in waits and where a test says so."""
 
-    def __init__(self, readings=lambda time: time):
-        self.time, self.readings = 100.0, readings
+    def __init__(self, readings=lambda time: time, pictures=lambda time: None):
+        self.time, self.readings, self.pictures = 100.0, readings, pictures
         self.commands, self.command_times = [], []
 
     def now(self):
@@ -28,7 +29,8 @@ class Bench:
         self.time = max(self.time, time_s)
 
     def observe(self):
-        return Observation.of_camera(self.readings(self.time), IMAGE, POSE)
+        observation = Observation.of_camera(self.readings(self.time), IMAGE, POSE)
+        return replace(observation, image_time=self.pictures(self.time))
 
     def command(self, command):
         self.commands.append(command)
@@ -116,6 +118,27 @@ def test_the_same_reading_is_answered_once_and_a_robot_that_gives_no_new_one_is_
     assert "no new reading for 0.2" in report.sentence
     assert bench.time == pytest.approx(101.26, abs=0.06)
     assert rests(bench)
+
+
+def test_a_camera_that_gives_no_new_picture_ends_the_loop_though_joints_are_still_read():
+    bench = Bench(pictures=lambda time: min(math.floor(time * 4.0 + 1e-6) / 4.0, 102.0))  # four a second, then none
+    report = run(bench, Driver(bench), rate_hz=20.0, blind_s=0.5)
+    assert report.end is End.STALE
+    assert "no new picture for 0.5" in report.sentence
+    assert bench.time == pytest.approx(102.0 + 0.5, abs=0.07)
+    assert rests(bench)
+
+
+def test_fingers_that_are_told_nothing_stay_as_they_were():
+    bench = Bench()
+    commands = iter([*[0.0] * 60, 1.0])
+    driver = SimpleNamespace(
+        percept=SimpleNamespace(fixation=SimpleNamespace(visible=True)),
+        respond=lambda observation: Command(np.zeros(6), next(commands, 0.0)),
+    )
+    report = run(bench, driver, rate_hz=20.0, hold_s=2.0)
+    assert report.end is End.HELD
+    assert bench.time == pytest.approx(100.0 + 59 * 0.05 + 2.0, abs=0.06)  # from the one command to close
 
 
 @pytest.mark.parametrize("error", [RuntimeError("camera unplugged"), KeyboardInterrupt()])
