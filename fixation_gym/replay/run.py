@@ -25,6 +25,7 @@ from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.recordings.catalogue import open_recording
+from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.recordings.stamps import OrderedFrames, in_order
 from fixation_gym.replay.alarms import alarms_on, calibration_summary
 from fixation_gym.replay.config import ReplayConfig
@@ -63,9 +64,10 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
     camera, pictures = recording.camera, len(recording)
     first = next(iter(recording))
     ordered = in_order(recording, str(config.recording))
-    target = choose_target(config, recording.target_box, ordered.frames[0], camera)
     straightener = Straightener(camera)
     ordered, left_px, offset = _checked_poses(ordered, camera.pinhole, straightener)
+    # After that, which may leave out the first pictures.
+    target = choose_target(config, recording.target_box, ordered.frames[0], camera)
     learning, estimator = learning_settings(config), chosen_estimator(config)
     settings = PerceptionSettings()
     unseen = straightener.unseen()
@@ -105,11 +107,16 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
             "commit": source_commit(),
             "wall_s": time.monotonic() - started,
         }
-        summary["notes"] = notes_on(summary, ordered.frames[0] is first)
+        summary["notes"] = notes_on(summary, _is_same(ordered.frames[0], first))
         write_json(out / SUMMARY_FILE, summary)
     if error is not None:
         raise UsageError(f"{error}; {len(done.rows)} pictures before it are in {out}")
     return summary
+
+
+def _is_same(a: RecordedFrame, b: RecordedFrame) -> bool:
+    """Whether two frames are of one picture, whatever their poses."""
+    return (a.name, a.time) == (b.name, b.time)
 
 
 def _checked_poses(
