@@ -61,18 +61,26 @@ def _child(root: ET.Element, tag: str) -> ET.Element:
 
 def _robot_at_table() -> ET.Element:
     """Robosuite's part, out of the cache if it is there; a cache that cannot be read or written is done without."""
-    file = _cache_folder() / f"robot-at-table-{_key()}.xml"
-    with contextlib.suppress(OSError, ET.ParseError):
-        return ET.parse(file).getroot()
+    folder = _cache_folder()
+    file = None if folder is None else folder / f"robot-at-table-{_key()}.xml"
+    if file is not None:
+        with contextlib.suppress(OSError, ET.ParseError):
+            return ET.parse(file).getroot()
     from fixation_gym.envs.robosuite_backend import robot_at_table
 
     text = robot_at_table(_TABLE_SIZE, _TABLE_TOP)
+    if file is not None:
+        _keep(file, text)
+    return ET.fromstring(text)
+
+
+def _keep(file: Path, text: str) -> None:
+    """Write a file of the cache, if that can be."""
     with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile("w", dir=file.parent, suffix=".tmp", delete=False, encoding="utf-8") as part:
             part.write(text)
         os.replace(part.name, file)  # so nobody ever reads half of it
-    return ET.fromstring(text)
 
 
 def _key() -> str:
@@ -90,6 +98,10 @@ def _assets() -> Path:
     return Path(spec.submodule_search_locations[0]) / "models" / "assets"
 
 
-def _cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "fixation-gym"
+def _cache_folder() -> Path | None:
+    """None for a user without a home, as in some containers."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    try:
+        return (Path(base) if base else Path.home() / ".cache") / "fixation-gym"
+    except RuntimeError:
+        return None

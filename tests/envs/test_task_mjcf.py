@@ -44,6 +44,15 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+def test_a_user_without_a_home_has_no_cache(monkeypatch):
+    def no_home():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(task_mjcf.Path, "home", no_home)
+    assert "robot0_" in task_mjcf.build_xml(None, looks=False)
+
+
 def test_half_a_file_is_written_again(folder):
     whole = task_mjcf.build_xml(None, looks=False)
     (file,) = folder.iterdir()
