@@ -121,11 +121,21 @@ def test_evaluate_says_in_one_line_what_is_wrong_with_a_file(agent, damage, mess
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("change", [{"mu.bias": np.zeros(5, np.float32)}, {"mu.bias": None}])
+@pytest.mark.parametrize(
+    "change", [{"mu.bias": np.zeros(5, np.float32)}, {"mu.bias": None}, {"mu.bias": np.array(["a"] * 4)}]
+)
 def test_weights_of_another_network_are_refused(agent, change):
     weights = {name: array for name, array in {**WEIGHTS, **change}.items() if array is not None}
     write_agent(agent, CARD, weights)
     with pytest.raises(UsageError, match="does not hold the weights of a sac agent; train it again"):
+        read_agent(agent)
+
+
+def test_a_single_array_is_no_agent(agent):
+    array = io.BytesIO()
+    np.save(array, np.zeros(3))
+    rewrite(agent, **{"actor.npz": array.getvalue()})
+    with pytest.raises(UsageError, match="is damaged or no agent"):
         read_agent(agent)
 
 

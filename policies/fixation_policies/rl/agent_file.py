@@ -88,14 +88,16 @@ def read_agent(path: Path) -> tuple[AgentCard, Weights]:
         raise _damaged(path) from error
     learner = CONFIGS[card.config]
     shapes = weight_shapes(card.algorithm, learner, 2 if learner.residual else 4)
-    found = {name: np.shape(weights[name]) for name in shapes if name in weights}
+    numbers = {name: np.asarray(weights[name]) for name in shapes if name in weights}
+    found = {name: array.shape for name, array in numbers.items() if array.dtype.kind == "f"}
     if found != shapes:
         raise UsageError(f"{path} does not hold the weights of a {card.algorithm} agent; train it again")
     return card, acting_weights(card.algorithm, learner, weights)
 
 
 def _numpy_weights(packed: bytes) -> Weights:
-    with np.load(io.BytesIO(packed), allow_pickle=False) as weights:
+    # As a zip at once: np.load takes a single array as well, which is no agent's.
+    with np.lib.npyio.NpzFile(io.BytesIO(packed), allow_pickle=False) as weights:
         return dict(weights)
 
 
