@@ -31,7 +31,9 @@ LOST = {("rgb", "object_textures"): 2, ("rgb", "light_colour"): 1, ("servo", "la
 
 def train(config, folder):
     return [
-        Candidate(name, seed, f"{name}-{seed}.zip", "0" * 12) for name in config.configs for seed in range(config.seeds)
+        Candidate(name, seed, f"{name}-{seed}.zip", "0" * 12, trained=True)
+        for name in config.configs
+        for seed in range(config.seeds)
     ]
 
 
@@ -112,6 +114,17 @@ def test_an_agent_that_was_trained_again_is_tested_again(tmp_path):
     measure(CONFIG, tmp_path, run, train)
     summary = measure(CONFIG, tmp_path, run, other)
     assert summary["episodes_resumed"] == 4 * (1 + 2 * len(AXES_HERE))  # the servo's
+
+
+def test_a_class_that_was_changed_is_tested_again_and_is_no_learner(tmp_path, monkeypatch):
+    module = tmp_path / "somebodys_policy.py"
+    module.write_text("class Still:\n    reset = act = print\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    config = replace(CONFIG, configs=(), policies=("somebodys_policy:Still",))
+    assert measure(config, tmp_path / "out", run)["differences"] == []
+    assert measure(config, tmp_path / "out", run)["episodes_resumed"] == 4 * (1 + 2 * len(AXES_HERE))
+    module.write_text(module.read_text() + "# changed\n")
+    assert measure(config, tmp_path / "out", run)["episodes_resumed"] == 0
 
 
 @pytest.fixture

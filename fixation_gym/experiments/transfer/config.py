@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from fixation_policies.rl.compare import CompareConfig
 
 _QUICK = TrainConfig(steps=300, eval_every=300, eval_episodes=4, learning_starts=100, buffer_size=1000)
+_DIGEST = 12
+"""Letters of a digest that are kept."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,9 @@ class Candidate:
     policy: str
     """A policy's name or an agent's file."""
     digest: str = ""
-    """Beginning of the SHA-256 of that file: changed, it is another agent."""
+    """Beginning of the SHA-256 of that file, or of the one that holds somebody else's class: changed, it is another."""
+    trained: bool = False
+    """Whether it is an agent."""
 
 
 @dataclass(frozen=True)
@@ -148,11 +152,13 @@ class TransferConfig:
 
     def given(self) -> list[Candidate]:
         """Agents from files, and policies that are not trained."""
+        from fixation_policies.catalogue import source_hashes
         from fixation_policies.rl.agent_file import read_card
 
         cards = [(path, read_card(Path(path))) for path in self.agents]
         agents = [candidate_agent(card.config, card.seed, path) for path, card in cards]
-        return [*agents, *(Candidate(name, 0, name) for name in self.policies)]
+        digests = {name: source_hashes(name, None).get("policy_sha256", "")[:_DIGEST] for name in self.policies}
+        return [*agents, *(Candidate(name, 0, name, digest) for name, digest in digests.items())]
 
     def shifts(self) -> list[Shift]:
         """No shift, then all axes at one severity, then at the next: part of a run shows all axes."""
@@ -180,5 +186,5 @@ class TransferConfig:
 
 def candidate_agent(config: str, training_seed: int, path: str) -> Candidate:
     """The agent in a file."""
-    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
-    return Candidate(config, training_seed, path, digest)
+    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:_DIGEST]
+    return Candidate(config, training_seed, path, digest, trained=True)

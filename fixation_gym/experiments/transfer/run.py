@@ -17,7 +17,7 @@ from fixation_gym.experiments.transfer.statistics import differences, rows
 
 CSV_FILE, DIFFERENCES_FILE, FIGURE_FILE = "transfer.csv", "differences.csv", "transfer.png"
 Key = tuple[str, int, str, str, str, int]
-"""(name, training seed, digest of the agent's file, axis, severity, seed of the episode)"""
+"""(name, training seed, digest of the file, axis, severity, seed of the episode)"""
 
 
 def cell_key(cell: Mapping[str, Any]) -> Key:
@@ -102,7 +102,7 @@ def measure(
     with EXPERIMENT.opened(out, settings, run, config.workers) as folder:
         tested = [*train(config, config.runs or out), *config.given()]
         results = folder.results(config.cells(tested))
-        learners = {one.name for one in tested if one.digest}
+        learners = {one.name for one in tested if one.trained}
         table = rows(results, learners)
         reference = config.configs[0] if config.configs else ""
         about = {
