@@ -1,5 +1,6 @@
 """The servo drives a robot at a steady rate, and the robot rests at the end: put your own ``Robot`` in its place."""
 
+from contextlib import closing
 from typing import Any
 
 import gymnasium as gym
@@ -19,8 +20,8 @@ def main(scenario: str = "opaque", seed: int = 1, settings: LoopSettings | None 
     policy = ServoPolicy(Perception(camera, support_height_m=ROBOT.workspace.table_height))
     robot = SimulatedRobot(env, seed)
     # Simulated time passes while the loop waits. With a real robot leave the clock out: the computer's keeps the rate.
-    report = run_loop(robot, policy, settings, clock=robot)
-    env.close()
+    with closing(env):
+        report = run_loop(robot, policy, settings, clock=robot)
     print(f"{report.end.value}: {report.sentence}; {report.periods} periods, {report.late} of them late")
     return report
 

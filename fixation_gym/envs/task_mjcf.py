@@ -78,9 +78,10 @@ def _keep(file: Path, text: str) -> None:
     """Write a file of the cache, if that can be."""
     with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=file.parent, suffix=".tmp", delete=False, encoding="utf-8") as part:
-            part.write(text)
-        os.replace(part.name, file)  # so nobody ever reads half of it
+        with tempfile.TemporaryDirectory(dir=file.parent) as folder:
+            part = Path(folder) / file.name
+            part.write_text(text, encoding="utf-8")
+            part.replace(file)  # so nobody ever reads half of it
 
 
 def _key() -> str:

@@ -45,7 +45,7 @@ class TimeOffset:
     std_s: float
     """By leaving out one pair of pictures after the other."""
     counts: bool
-    """Whether it is surely there."""
+    """Whether it is surely there. Never one at the end of what is tried: it may be any larger one."""
 
 
 def time_offset(frames: Sequence[RecordedFrame], pairs: Sequence[CornerPair], camera: Intrinsics) -> TimeOffset | None:
@@ -66,7 +66,8 @@ def time_offset(frames: Sequence[RecordedFrame], pairs: Sequence[CornerPair], ca
     others = [_best(np.delete(squares, k, axis=0).mean(axis=0)) for k in range(len(squares))]
     std = float(np.sqrt((len(others) - 1) * np.var(others)))  # the jackknife's
     sure = abs(best) > max(_SURE * std, _LEAST_S) and mean.min() < _LEFT_SHARE * mean[len(_OFFSETS_S) // 2]
-    return TimeOffset(best, std, bool(sure))
+    inside = 0 < int(np.argmin(mean)) < len(_OFFSETS_S) - 1
+    return TimeOffset(best, std, bool(sure and inside))
 
 
 def put_right(ordered: OrderedFrames, offset_s: float) -> OrderedFrames:

@@ -94,6 +94,13 @@ def test_late_and_early_poses_are_put_right_by_the_pictures_and_said(frames_late
     assert summary["without_pose"] == left_out  # beyond the end one pose is made up, the others are not known
 
 
+def test_a_delay_beyond_what_is_tried_is_not_put_right_by_a_part_of_it(tmp_path):
+    summary = judged(tmp_path, late(5))
+    assert summary["without_pose"] == 0
+    assert not any("every picture was given the pose" in alarm for alarm in summary["alarms"])
+    assert summary["alarms"]  # but something is said
+
+
 def test_late_poses_are_learnt_by_the_distance_where_pictures_do_not_tell(monkeypatch, tmp_path):
     monkeypatch.setattr(run, "time_offset", lambda *_: None)
     summary = judged(tmp_path, late(1))
