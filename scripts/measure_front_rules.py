@@ -131,7 +131,7 @@ def look(env: gymnasium.Env, policy: Any, seed: int, seconds: float) -> dict[str
 def episodes(config: Config) -> Iterator[dict[str, Any]]:
     """Results of all episodes, those in the file first."""
     config.out.mkdir(parents=True, exist_ok=True)
-    path = config.out / f"{config.renderer}.jsonl"
+    path = config.out / f"{config.renderer}-{config.seconds:g}s.jsonl"  # other settings have a file of their own
     kept = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     known = {(item["scenario"], item["seed"]): item for item in kept}
     for scenario in config.scenarios:
