@@ -27,8 +27,6 @@ _BARRED_DEPTH = 0.01
 """A way is barred if a hand smaller by this would still touch something, m."""
 _MOST_OPEN = 0.31
 """Largest share of the ways that is not barred in the end."""
-_MOST_AMONG = 0.36
-"""Largest share of the ways among which the free one is drawn that is not barred."""
 _ABOVE: MaskArray = REACH_GRID[:, 1] > math.radians(75.0)
 """Which ways of the reach's grid come from above."""
 _MOST_ABOVE = 0.35
@@ -94,7 +92,7 @@ def draw_pool(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> Pool 
     """Obstacles that leave the free way, each as if it were alone; None if all of them together bar too little."""
     counts = (_FIRST_CANDIDATES, _CANDIDATES)
     drafts = draw_for_ways(counts, _BEYOND, _aim(goal), goal.room, menu_of(scenario), rng)
-    quota, hands = _quota(goal), hand_axes(goal.ways)
+    quota, hands = _quota(goal, scenario.most_open), hand_axes(goal.ways)
     if len(drafts.kinds) == 0 or not could_bar(goal.room.ends[-1], hands, drafts, _smaller_hand(), quota):
         return None
     barred = barred_ways(goal.room.ends[-1], hands, drafts, _smaller_hand())
@@ -128,14 +126,14 @@ def _smaller_hand() -> Aligned:
     return swept_hand(-_BARRED_DEPTH, wrist=False)
 
 
-def _quota(goal: Goal) -> Quota:
+def _quota(goal: Goal, most_among: float) -> Quota:
     """How many ways may stay open.
 
     Also of those from above, and of those among which the free one is drawn: a shelf leaves only low ways, and a hand
     that always comes in low must not find most of them open.
     """
     groups = np.array([np.ones(len(goal.ways), bool), goal.drawn_among, _ABOVE & ~goal.near_free])
-    return Quota(groups, np.array([_MOST_OPEN, _MOST_AMONG, _MOST_ABOVE]))
+    return Quota(groups, np.array([_MOST_OPEN, most_among, _MOST_ABOVE]))
 
 
 def bar_ways(

@@ -55,6 +55,8 @@ class Scenario:
     """Both exponents of the beta distribution from which its azimuth is drawn over the reach; (1, 1) is even. Fewer
     scenes are found for a way in the middle, which has ways on all sides that it takes along, than for one at an end:
     the shape is to make up for that, so that all ways are free about equally often."""
+    most_open: float = 0.36
+    """Largest share of the ways among which the free one is drawn that obstacles need not bar."""
     moving_count: tuple[int, int] = (0, 0)
     """Smallest and largest number of obstacles that move, inclusive."""
     alpha: tuple[float, float] = (0.3, 0.7)
@@ -113,6 +115,7 @@ class Scenario:
         require_range("alpha", self.alpha, 0.0, 1.0)
         require_range("free_elevation_deg", self.free_elevation_deg, *ROBOT.arm.reach.elevations_deg)
         require_shape("free_azimuth_shape", self.free_azimuth_shape)
+        require_number("most_open", self.most_open, 0.2, 1.0)
         require_range("view_elevation_deg", self.view_elevation_deg, 30.0, 60.0)
         require_names("obstacle_motions", self.obstacle_motions, OBSTACLE_MOTIONS)
         require_range("drive_speed", self.drive_speed, 0.01, 0.10)
@@ -207,10 +210,11 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario(
             "bin",
             ("opaque", "translucent", "wire"),
-            first_kinds=("bin",),
+            first_kinds=("bin", "niche"),
             obstacle_count=(2, 6),
-            free_elevation_deg=_reached(46.0, 82.0),
+            free_elevation_deg=_reached(46.0, 85.0),
             free_azimuth_shape=(1.3, 1.1),
+            most_open=0.32,
         ),
         Scenario("clutter", PLAIN_MATERIALS, obstacle_count=(5, 9)),
         Scenario(

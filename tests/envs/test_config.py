@@ -26,6 +26,7 @@ def test_a_mapping_changes_fields_of_a_named_scenario_and_survives_json():
         ({"free_elevation_deg": [20, 30]}, "40.0..85.0"),
         ({"free_azimuth_shape": [0.0, 1.0]}, "two numbers within 0.2..5"),
         ({"free_azimuth_shape": 1.0}, "two numbers within 0.2..5"),
+        ({"most_open": 0.1}, "most_open"),
         ({"first_kinds": ["sofa"]}, "cabinet"),
         ({"base": "opaque", "moving_count": [4, 4]}, "add up to 9"),
         ({"coloured_frames": "red"}, "true or false"),
