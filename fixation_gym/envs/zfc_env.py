@@ -15,6 +15,7 @@ from fixation_gym.envs.perceiving import perception_for
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.rewards import RewardWeights
 from fixation_gym.envs.sensor_noise import SensorNoise
+from fixation_gym.envs.way_view import way_view
 from fixation_gym.envs.zfc_observation import (
     OBSERVATIONS,
     fixation_vector,
@@ -23,13 +24,18 @@ from fixation_gym.envs.zfc_observation import (
     zfc_observation_space,
 )
 from fixation_gym.fixator import Fixator, FixatorGains, action_of
+from fixation_gym.perception.percept import Percept
 from fixation_gym.robots import ROBOT
+from fixation_gym.surroundings import Surroundings
 from fixation_gym.types import Observation
 
 if TYPE_CHECKING:
     from fixation_gym.envs.privileged_map import ObstacleDepth
 
 _GAINS = FixatorGains(open_loop=OpenLoopGains(hold_seconds=3.0))
+_CENTRED = 0.06
+"""While the gaze still swings to the target, small errors of the time stamps look like motion: what is then seen is
+not remembered. Offset of the target from the image centre, normalised coordinates."""
 
 
 class FixationPickZFC(FixationPickEnv):
@@ -59,6 +65,7 @@ class FixationPickZFC(FixationPickEnv):
     | key | shape | meaning |
     |---|---|---|
     | ``zfc_map`` ("zfc") | (1, 32, 32) float32 | P(nearer than the fixated object), 0..1; 128/255 = unknown |
+    | ``ways`` ("ways") | (2, 32, 32) float32 | remembered ways to the object: barred, never looked at; 0..1 |
     | nothing ("blind") | | |
     | ``rgb`` ("rgb") | (H, W, 3) uint8 | wrist image |
     | ``depth`` ("depth") | (H, W) float32 | what a stereo depth camera says, m; 0: nothing (``depth_camera``) |
@@ -95,7 +102,7 @@ class FixationPickZFC(FixationPickEnv):
 
         Args:
             scenario: as in ``FixationPickEnv``, like all that follow but for two:
-            observation: "zfc", "blind", "rgb", "depth" or "privileged".
+            observation: "zfc", "ways", "blind", "rgb", "depth" or "privileged".
             image_size: (height, width) of the wrist image, px; may not be None, for perception works on it.
             sensor_noise: name from ``sensor_noise.SENSOR_NOISE`` or a mapping of ``SensorNoise`` fields.
             control_frequency: steps per second.
@@ -130,6 +137,7 @@ class FixationPickZFC(FixationPickEnv):
         del self._arguments["depth_camera"]  # follows from that
         self._truth: ObstacleDepth | None = None
         self._fixator = Fixator(perception_for(self.scenario, self.intrinsics), _GAINS)
+        self._surroundings = Surroundings()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -138,6 +146,7 @@ class FixationPickZFC(FixationPickEnv):
         self._truth = None
         sensed, info = super().reset(seed=seed, options=options)
         self._fixator.reset()
+        self._surroundings.reset()
         return self._perceived(sensed, info), info
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -159,11 +168,11 @@ class FixationPickZFC(FixationPickEnv):
         super().close()
 
     def _episode(self) -> dict[str, Any]:
-        return {**super()._episode(), "fixator": self._fixator}
+        return {**super()._episode(), "fixator": self._fixator, "surroundings": self._surroundings}
 
     def _continue(self, episode: dict[str, Any]) -> None:
         super()._continue(episode)
-        self._fixator = episode["fixator"]
+        self._fixator, self._surroundings = episode["fixator"], episode["surroundings"]
 
     def _true_map(self, distance: float) -> np.ndarray:
         if self._truth is None:
@@ -172,6 +181,13 @@ class FixationPickZFC(FixationPickEnv):
             self._truth = ObstacleDepth(self.wrist_view, self.model)
         return map_levels(self._truth.nearer(self.data, distance))
 
+    def _ways(self, percept: Percept) -> np.ndarray:
+        """Remembers what is seen now, and says what is known of the ways."""
+        fixation, fixator = percept.fixation, self._fixator
+        if fixation.visible and fixator.stage is None and np.linalg.norm(fixation.centroid) < _CENTRED:
+            self._surroundings.look(percept, fixator.perception.support_height_m)
+        return way_view(percept, fixator.T_base_cam, self._surroundings)
+
     def _perceived(self, sensed: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
         """What the learner sees, for the observation and info of ``FixationPick-v0``."""
         reading, fixator = Observation.from_dict(sensed), self._fixator
@@ -179,6 +195,8 @@ class FixationPickZFC(FixationPickEnv):
         observation: dict[str, Any] = {}
         if self._shown == "zfc":
             observation["zfc_map"] = map_levels(percept.zfc.cells)
+        elif self._shown == "ways":
+            observation["ways"] = self._ways(percept)
         elif self._shown == "rgb":
             observation["rgb"] = reading.rgb
         elif self._shown == "depth":

@@ -15,7 +15,7 @@ from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray, Observation
 
-OBSERVATIONS = ("zfc", "blind", "rgb", "depth", "privileged")
+OBSERVATIONS = ("zfc", "ways", "blind", "rgb", "depth", "privileged")
 """What the learner gets beside ``fixation`` and ``proprio``."""
 _STAGES = tuple(Stage)
 
@@ -33,6 +33,7 @@ def zfc_observation_space(observation: str, image_size: tuple[int, int]) -> spac
     cells = spaces.Box(0.0, 1.0, (1, CELLS, CELLS), np.float32)
     views: dict[str, dict[str, spaces.Space[Any]]] = {
         "zfc": {"zfc_map": cells},
+        "ways": {"ways": spaces.Box(0.0, 1.0, (2, CELLS, CELLS), np.float32)},
         "blind": {},
         "rgb": {"rgb": spaces.Box(0, 255, (*image_size, 3), np.uint8)},
         "depth": {"depth": depth_space(image_size)},

@@ -38,6 +38,7 @@ class Configuration:
 
 CONFIGS: dict[str, Configuration] = {
     "zfc": Configuration("zfc"),
+    "ways": Configuration("ways"),
     "blind": Configuration("blind"),
     "rgb": Configuration("rgb"),
     "depth": Configuration("depth"),
@@ -61,9 +62,9 @@ class TrainConfig:
     """One training run. A step is a decision of the learner. Fields that are ``Fixed`` are no options of ``train``."""
 
     config: str = "zfc"
-    """What the learner sees: zfc (zero-flow map), blind (no map), rgb (image), rgb_augmented (larger images, in other
-    places and colours at random), depth (a stereo depth camera), privileged (true map), or residual: the map, to add
-    to the servo's lateral velocity."""
+    """What the learner sees: zfc (zero-flow map), ways (what is remembered of all ways to the target), blind (no map),
+    rgb (image), rgb_augmented (larger images, in other places and colours at random), depth (a stereo depth camera),
+    privileged (true map), or residual: the map, to add to the servo's lateral velocity."""
     algorithm: str = "sac"
     """sac or ppo."""
     scenario: str = "mixed"

@@ -19,6 +19,7 @@ from fixation_policies.rl.config import CONFIGS, Configuration
 
 VIEWS: dict[str, str | None] = {
     "zfc": "zfc_map",
+    "ways": "ways",
     "blind": None,
     "rgb": "rgb",
     "depth": "depth",
@@ -41,8 +42,9 @@ _NEARNESS_GAIN = 2.0
 """Two thirds of the target's distance, or twice it, are as near and as far as a cell of depth can say."""
 
 Memory = NDArray[np.float32]
-"""Of maps: shape (2, h, w), in [-1, 1], now and what has been seen. Of images: grey levels, shape (6, h, w), the newest
-and a running mean, or (3 n, h, w), those of the last n control periods, the newest first."""
+"""Of maps: shape (2, h, w), in [-1, 1], now and what has been seen; of ways, which the environment remembers, as they
+are. Of images: grey levels, shape (6, h, w), the newest and a running mean, or (3 n, h, w), those of the last n control
+periods, the newest first."""
 
 
 def input_space(learner: Configuration) -> spaces.Dict:
@@ -68,6 +70,7 @@ def remember(memory: Memory | None, obs: Mapping[str, Any], learner: Configurati
     Of a map, or of depth, it holds the newest, centred so that unknown is 0, and evidence that adds up and fades: what
     one pair of frames says is noisy and sparse, and things leave the image as the camera comes near. Of images it holds
     the newest and a running mean, whose difference shows motion, or the last ones; before the first they were like it.
+    Ways are remembered by the environment.
     """
     if "rgb" in obs:
         size = (learner.image_cells, learner.image_cells)
@@ -77,6 +80,8 @@ def remember(memory: Memory | None, obs: Mapping[str, Any], learner: Configurati
             return np.tile(image, (kept, 1, 1)) if memory is None else np.concatenate([image, memory[:-3]])
         mean = image if memory is None else _IMAGE_LEAK * memory[3:] + (1.0 - _IMAGE_LEAK) * image
         return np.concatenate([image, mean])
+    if "ways" in obs:
+        return 2.0 * obs["ways"] - np.float32(1.0)
     cells = _cells(obs)
     if cells is None:
         return None

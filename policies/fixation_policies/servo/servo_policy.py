@@ -18,21 +18,15 @@ from fixation_gym.geometry.rigid import inverse, transform
 from fixation_gym.geometry.twist import exp_twist
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.pipeline import Perception
-from fixation_gym.perception.zero_flow.obstacle_memory import (
-    MemorySettings,
-    ObstacleMemory,
-    believed_points,
-    remember,
-)
+from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings
 from fixation_gym.robots import ROBOT
+from fixation_gym.surroundings import Obstacles, Surroundings
 from fixation_gym.types import Command, FloatArray, Observation
 from fixation_policies.base import Action, Estimate
 from fixation_policies.servo.gains import ServoGains
 from fixation_policies.servo.phases import Phase, Situation, next_phase
-from fixation_policies.servo.way_search import Obstacles, WaySearch
+from fixation_policies.servo.way_search import WaySearch
 
-_OWN_RADIUS = 0.05
-"""Points so near to the fixated point are the target's own, m."""
 _INNER = 0.34
 """Nearer to the target than this the hand is among what stands around it, m."""
 _BACKING_OFF = 0.05
@@ -44,7 +38,7 @@ _ROLL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 class ServoPolicy:
     """The scripted baseline: gaze, approach and lateral laws (Eqs. 6-8), then an open-loop grasp.
 
-    State: the fixator, obstacle memory, the search for a way, and the phase.
+    State: the fixator, what is remembered around the target, the search for a way, and the phase.
     """
 
     def __init__(
@@ -66,19 +60,19 @@ class ServoPolicy:
         self.estimate: Estimate | None = None
         self._fixator = Fixator(perception, FixatorGains(self.gains.gaze, self.gains.open_loop))
         self._avoid_obstacles = avoid_obstacles
-        self._memory_settings = memory or MemorySettings()
+        self._surroundings = Surroundings(memory)
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
         """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
         self._fixator.reset()
-        self._memory = ObstacleMemory.empty()
+        self._surroundings.reset()
         self._phase = Phase.SEARCH
         self._phase_start = 0.0
-        self._last_seen = self._remembered_time = -math.inf
+        self._last_seen = -math.inf
         self._stage: Stage | None = None
         self._grasps = 0
-        self._search = WaySearch(self.gains)
+        self._search = WaySearch(self.gains, self._surroundings)
         self.estimate = None
         self.percept: Percept | None = None
 
@@ -94,7 +88,7 @@ class ServoPolicy:
             fresh: whether its image is new; if not, what was last perceived stands.
         """
         self.percept = percept = self._fixator.look(observation, fresh)
-        self._remember_obstacles(percept)
+        self._look_around(percept)
         obstacles = self._obstacles(percept)
         obstacle = self._obstacle_term(percept, self._fixator.T_base_cam, obstacles)
         self._advance(percept, observation.time, obstacle)
@@ -113,31 +107,17 @@ class ServoPolicy:
 
     # -- obstacles -----------------------------------------------------------------------------------------------
 
-    def _remember_obstacles(self, percept: Percept) -> None:
-        """Add the zero-flow test to the memory."""
+    def _look_around(self, percept: Percept) -> None:
+        """Add the zero-flow test to what is remembered."""
         # While the gaze still swings to the target, small errors of the time stamps look like motion.
         centred = float(np.linalg.norm(percept.fixation.centroid)) < self.gains.grasp_centred
-        looking = centred and self._stage is None and self._phase is not Phase.SEARCH
-        new = percept.flow.time > self._remembered_time  # an image that was there before tells nothing twice
-        if looking and percept.flow.valid and new:
-            self._remembered_time = percept.flow.time
-            self._memory = remember(
-                self._memory,
-                percept.zfc,
-                percept.flow.intrinsics,
-                percept.T_base_flow,
-                percept.flow.time,
-                self._memory_settings,
-                self._fixator.perception.support_height_m,
-            )
-            self._search.look(percept)
+        if centred and self._stage is None and self._phase is not Phase.SEARCH:
+            self._surroundings.look(percept, self._fixator.perception.support_height_m)
 
     def _obstacles(self, percept: Percept) -> Obstacles:
-        """What is believed to stand there, without the target's own points."""
-        points, evidence = believed_points(self._memory, self._memory_settings)
-        others = np.linalg.norm(points - percept.fixation.point_base, axis=1) > _OWN_RADIUS
-        others &= self._avoid_obstacles
-        return Obstacles(points[others], evidence[others])
+        """What is believed to stand there."""
+        points, evidence = self._surroundings.obstacles(percept.fixation.point_base)
+        return Obstacles(points, evidence) if self._avoid_obstacles else Obstacles(points[:0], evidence[:0])
 
     def _obstacle_term(self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles) -> ObstacleTerm:
         in_camera = transform(inverse(T_base_cam), obstacles.points)

@@ -1,45 +1,25 @@
-"""Which way the hand takes, while the servo learns what stands around the target: the choice and its memory."""
+"""Which way the hand takes, while the servo learns what stands around the target."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from fixation_gym.control.ways import (
-    SeenSpace,
-    chosen_way,
-    grasp_axes,
-    known_ways,
-    lateral_direction,
-    way_costs,
-)
+from fixation_gym.control.ways import chosen_way, grasp_axes, known_ways, lateral_direction, way_costs
 from fixation_gym.perception.percept import Percept
-from fixation_gym.perception.zero_flow.obstacle_memory import seen_places
+from fixation_gym.surroundings import Obstacles, Surroundings
 from fixation_gym.types import FloatArray
 from fixation_policies.servo.gains import ServoGains
 
-_HIDING = 0.06
-"""A thing hides what is behind it if it is nearer by this share."""
-
-
-class Obstacles(NamedTuple):
-    """Points of obstacles that are believed in one control step."""
-
-    points: FloatArray
-    """Shape (n, 3), in base, m."""
-    evidence: FloatArray
-    """Of each point, shape (n,)."""
-
 
 class WaySearch:
-    """Keeps what was looked at, the way that is taken, and those that were tried in vain."""
+    """Keeps the way that is taken, and those that were tried in vain."""
 
-    def __init__(self, gains: ServoGains) -> None:
-        """Start without knowledge."""
+    def __init__(self, gains: ServoGains, surroundings: Surroundings) -> None:
+        """Start without a way; ``surroundings`` know what was looked at."""
         self._gains = gains
-        self._seen: SeenSpace | None = None
+        self._surroundings = surroundings
         self._way: int | None = None
         self._arrived = math.inf
         self._tried = np.zeros((0, 3))
@@ -49,16 +29,6 @@ class WaySearch:
     def has_way(self) -> bool:
         """Whether a way was chosen."""
         return self._way is not None
-
-    def look(self, percept: Percept) -> None:
-        """Note which places around the target are in view."""
-        target = percept.fixation.point_base
-        if self._seen is None:
-            self._seen = SeenSpace.empty(math.atan2(target[1], target[0]))
-        places = self._seen.places(target)
-        self._seen = self._seen.with_seen(
-            seen_places(places, percept.zfc, percept.flow.intrinsics, percept.T_base_flow, _HIDING)
-        )
 
     def choose(
         self, percept: Percept, T_base_cam: FloatArray, obstacles: Obstacles, blocked: bool
@@ -71,12 +41,12 @@ class WaySearch:
             obstacles: what is believed to stand there.
             blocked: whether something is surely in the corridor along the present line of sight.
         """
-        gains, target = self._gains, percept.fixation.point_base
-        if self._seen is None:
+        gains, target, seen = self._gains, percept.fixation.point_base, self._surroundings.seen
+        if seen is None:
             return np.zeros(2), 0.0
         present = T_base_cam[:3, 3] - target
         present /= np.linalg.norm(present)
-        ways = known_ways(*obstacles, target, self._seen, gains.way_margin)
+        ways = known_ways(*obstacles, target, seen, gains.way_margin)
         near = percept.fixation.distance_m < 0.9 * gains.orbit_distance
         waited = percept.time - self._arrived > gains.wait_seconds
         if blocked and (near or waited) and self._way is not None and self._arrived < math.inf:
@@ -94,20 +64,21 @@ class WaySearch:
             self._arrived = percept.time
         if near or self._arrived == math.inf or self.may_enter(percept.time):
             return direction, angle
-        return self._look_aside(way, T_base_cam, target, present)
+        return self._look_aside(seen.towards_unseen(way, target, present), T_base_cam)
 
-    def _look_aside(
-        self, way: int, T_base_cam: FloatArray, target: FloatArray, present: FloatArray
-    ) -> tuple[FloatArray, float]:
-        """Lateral direction in ``cam`` to where more of a way's corridor comes into view, and an angle to go, rad."""
-        assert self._seen is not None
-        aside = T_base_cam[:3, :2].T @ self._seen.towards_unseen(way, target, present)
+    def _look_aside(self, unseen: FloatArray, T_base_cam: FloatArray) -> tuple[FloatArray, float]:
+        """Lateral direction in ``cam`` to where more of a way's corridor comes into view, and an angle to go, rad.
+
+        ``unseen`` leads there across the line of sight, shape (3,), in base.
+        """
+        aside = T_base_cam[:3, :2].T @ unseen
         offset = float(np.linalg.norm(aside))
         return (aside / offset, self._gains.look_angle) if offset > 0.0 else (np.zeros(2), 0.0)
 
     def may_enter(self, time: float) -> bool:
         """Whether the hand may go in on its way at ``time`` s: it was looked at, or looking longer did not help."""
-        if self._seen is None or self._way is None:
+        seen = self._surroundings.seen
+        if seen is None or self._way is None:
             return False
-        seen = self._seen.least_seen_share(self._way)
-        return seen > self._gains.seen_share or time - self._arrived > self._gains.look_seconds
+        share = seen.least_seen_share(self._way)
+        return share > self._gains.seen_share or time - self._arrived > self._gains.look_seconds

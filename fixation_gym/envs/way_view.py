@@ -1,0 +1,62 @@
+"""What is remembered of the ways to the target, as the camera would see them: the learner's longest memory."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fixation_gym.control.ways import Ways, known_ways
+from fixation_gym.perception.percept import Percept
+from fixation_gym.perception.zero_flow.evidence_map import CELLS
+from fixation_gym.surroundings import Surroundings
+from fixation_gym.types import FloatArray
+
+_WIDEST = np.radians(75.0)
+"""Angle between the present line of sight and the ways at the middle of the view's borders, rad."""
+_MARGIN = 0.012
+"""How far off remembered points may be, m."""
+_SURE = 60.0
+"""Evidence in a corridor (points times frames) with which it is surely barred: half of the scale, ..."""
+_FULL = 180.0
+"""... which grows with its logarithm and ends here."""
+_BEYOND = np.cos(np.radians(9.0))
+"""Cosine of the angle to the nearest way of the reach from which on the arm does not get there."""
+
+
+def way_view(percept: Percept, T_base_cam: FloatArray, surroundings: Surroundings) -> NDArray[np.float32]:
+    """Ways to the target around the present line of sight, shape (2, 32, 32), 0..1.
+
+    A cell is a direction from the target to the camera. The middle is the present one; to the right and down in the
+    view are those that the camera gets to when it moves to its right and down, 4.7 degrees per cell. The first layer
+    is how surely something bars the hand that comes in from there, 1 also where the arm does not reach; the second is
+    the share of its corridor that was never looked at.
+    """
+    target, seen = percept.fixation.point_base, surroundings.seen
+    if seen is None:
+        return np.stack([np.zeros((CELLS, CELLS), np.float32), np.ones((CELLS, CELLS), np.float32)])
+    ways = known_ways(*surroundings.obstacles(target), target, seen, _MARGIN)
+    return _as_seen(ways, _directions(T_base_cam, target))
+
+
+def _directions(T_base_cam: FloatArray, target: FloatArray) -> FloatArray:
+    """Unit vectors from the target to the camera of every cell, shape (32, 32, 3), in base."""
+    present = T_base_cam[:3, 3] - target
+    present /= max(float(np.linalg.norm(present)), 1e-9)
+    right, down = (axis - (axis @ present) * present for axis in T_base_cam[:3, :2].T)
+    offsets = (np.arange(CELLS) + 0.5) / CELLS * 2.0 - 1.0
+    x, y = np.meshgrid(_WIDEST * offsets, _WIDEST * offsets)
+    angle = np.hypot(x, y)
+    aside = (x[..., None] * right + y[..., None] * down) * np.sinc(angle / np.pi)[..., None]
+    directions = np.cos(angle)[..., None] * present + aside
+    return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+
+def _as_seen(ways: Ways, directions: FloatArray) -> NDArray[np.float32]:
+    """The two layers, each cell like the nearest way of the reach."""
+    likeness = directions @ ways.directions.T
+    nearest = likeness.argmax(axis=-1)
+    sure = np.clip(np.log1p(ways.evidence / _SURE) / math.log1p(_FULL / _SURE), 0.0, 1.0)
+    barred = np.where(likeness.max(axis=-1) > _BEYOND, sure[nearest], 1.0)
+    return np.stack([barred, ways.unseen[nearest]]).astype(np.float32)

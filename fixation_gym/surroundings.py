@@ -1,0 +1,75 @@
+"""What is remembered around the target: points of obstacles, and which places were looked at."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fixation_gym.control.ways import SeenSpace
+from fixation_gym.perception.percept import Percept
+from fixation_gym.perception.zero_flow.obstacle_memory import (
+    MemorySettings,
+    ObstacleMemory,
+    believed_points,
+    remember,
+    seen_places,
+)
+from fixation_gym.types import FloatArray
+
+_OWN_RADIUS = 0.05
+"""Points so near to the fixated point are the target's own, m."""
+_HIDING = 0.06
+"""A thing hides what is behind it if it is nearer by this share."""
+
+
+class Obstacles(NamedTuple):
+    """Points of obstacles that are believed in one control step."""
+
+    points: FloatArray
+    """Shape (n, 3), in base, m."""
+    evidence: FloatArray
+    """Of each point, shape (n,), in frames."""
+
+
+class Surroundings:
+    """Adds up what every zero-flow test says of the work space.
+
+    State: the obstacle memory, the places that were looked at, and the time of the last test.
+    """
+
+    def __init__(self, settings: MemorySettings | None = None) -> None:
+        """Start without knowledge; ``settings`` say how evidence is kept."""
+        self._settings = settings or MemorySettings()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._memory = ObstacleMemory.empty()
+        self._time = -math.inf
+        self.seen: SeenSpace | None = None
+        """Which places around the target were looked at; None before the first test."""
+
+    def look(self, percept: Percept, support_height_m: float | None) -> None:
+        """Take in a zero-flow test, and which places around the target are in view.
+
+        Args:
+            percept: of this control step; a test that was taken in before tells nothing twice.
+            support_height_m: height of the table in base, m; None: unknown.
+        """
+        if not percept.flow.valid or percept.flow.time <= self._time:
+            return
+        self._time = percept.flow.time
+        camera = (percept.flow.intrinsics, percept.T_base_flow)
+        self._memory = remember(self._memory, percept.zfc, *camera, self._time, self._settings, support_height_m)
+        target = percept.fixation.point_base
+        if self.seen is None:
+            self.seen = SeenSpace.empty(math.atan2(target[1], target[0]))
+        self.seen = self.seen.with_seen(seen_places(self.seen.places(target), percept.zfc, *camera, _HIDING))
+
+    def obstacles(self, target: FloatArray) -> Obstacles:
+        """What is believed to stand there, without the own points of the target, in base, shape (3,), m."""
+        points, evidence = believed_points(self._memory, self._settings)
+        others = np.linalg.norm(points - target, axis=1) > _OWN_RADIUS
+        return Obstacles(points[others], evidence[others])
