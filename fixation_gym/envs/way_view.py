@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fixation_gym.control.ways import Ways, known_ways
+from fixation_gym.control.ways import SeenSpace, Ways, known_ways
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.surroundings import Surroundings
@@ -26,18 +26,31 @@ _BEYOND = np.cos(np.radians(9.0))
 
 
 def way_view(percept: Percept, T_base_cam: FloatArray, surroundings: Surroundings) -> NDArray[np.float32]:
+    """What is remembered of the ways to the target, as ``ways_in_view`` shows it; all unseen at first."""
+    target, seen = percept.fixation.point_base, surroundings.seen
+    if seen is None:
+        seen = SeenSpace.empty(0.0)
+    return ways_in_view(known_ways(*surroundings.obstacles(target), target, seen, _MARGIN), T_base_cam, target)
+
+
+def ways_in_view(ways: Ways, T_base_cam: FloatArray, target: FloatArray) -> NDArray[np.float32]:
     """Ways to the target around the present line of sight, shape (2, 32, 32), 0..1.
 
     A cell is a direction from the target to the camera. The middle is the present one; to the right and down in the
     view are those that the camera gets to when it moves to its right and down, 4.7 degrees per cell. The first layer
     is how surely something bars the hand that comes in from there, 1 also where the arm does not reach; the second is
     the share of its corridor that was never looked at.
+
+    Args:
+        ways: what is known of them.
+        T_base_cam: camera pose, shape (4, 4).
+        target: in base, shape (3,), m.
     """
-    target, seen = percept.fixation.point_base, surroundings.seen
-    if seen is None:
-        return np.stack([np.zeros((CELLS, CELLS), np.float32), np.ones((CELLS, CELLS), np.float32)])
-    ways = known_ways(*surroundings.obstacles(target), target, seen, _MARGIN)
-    return _as_seen(ways, _directions(T_base_cam, target))
+    likeness = _directions(T_base_cam, target) @ ways.directions.T
+    nearest = likeness.argmax(axis=-1)
+    sure = np.clip(np.log1p(ways.evidence / _SURE) / math.log1p(_FULL / _SURE), 0.0, 1.0)
+    barred = np.where(likeness.max(axis=-1) > _BEYOND, sure[nearest], 1.0)
+    return np.stack([barred, ways.unseen[nearest]]).astype(np.float32)
 
 
 def _directions(T_base_cam: FloatArray, target: FloatArray) -> FloatArray:
@@ -45,18 +58,9 @@ def _directions(T_base_cam: FloatArray, target: FloatArray) -> FloatArray:
     present = T_base_cam[:3, 3] - target
     present /= max(float(np.linalg.norm(present)), 1e-9)
     right, down = (axis - (axis @ present) * present for axis in T_base_cam[:3, :2].T)
-    offsets = (np.arange(CELLS) + 0.5) / CELLS * 2.0 - 1.0
-    x, y = np.meshgrid(_WIDEST * offsets, _WIDEST * offsets)
+    offsets = _WIDEST * ((np.arange(CELLS) + 0.5) / CELLS * 2.0 - 1.0)
+    x, y = np.meshgrid(offsets, offsets)
     angle = np.hypot(x, y)
     aside = (x[..., None] * right + y[..., None] * down) * np.sinc(angle / np.pi)[..., None]
     directions = np.cos(angle)[..., None] * present + aside
     return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-
-
-def _as_seen(ways: Ways, directions: FloatArray) -> NDArray[np.float32]:
-    """The two layers, each cell like the nearest way of the reach."""
-    likeness = directions @ ways.directions.T
-    nearest = likeness.argmax(axis=-1)
-    sure = np.clip(np.log1p(ways.evidence / _SURE) / math.log1p(_FULL / _SURE), 0.0, 1.0)
-    barred = np.where(likeness.max(axis=-1) > _BEYOND, sure[nearest], 1.0)
-    return np.stack([barred, ways.unseen[nearest]]).astype(np.float32)

@@ -39,11 +39,12 @@ def assert_same(first, second):
         np.testing.assert_array_equal(a, b)
 
 
-@pytest.fixture(params=["pick", "zfc", "privileged", "any_colour", "realistic"])
+@pytest.fixture(params=["pick", "zfc", "ways", "privileged", "any_colour", "realistic"])
 def env(request):
     made = {
         "pick": lambda: FixationPickEnv(MOVING, image_size=SIZE),
         "zfc": lambda: FixationPickZFC(MOVING, image_size=SIZE),
+        "ways": lambda: FixationPickZFC(MOVING, "ways", image_size=SIZE),
         "privileged": lambda: FixationPickZFC("opaque", "privileged", image_size=SIZE),
         "realistic": lambda: FixationPickZFC(MOVING, image_size=SIZE, sensor_noise="realistic"),
         "any_colour": lambda: FixationPickZFC("any_colour", image_size=SIZE),

@@ -21,7 +21,14 @@ from fixation_gym.types import Observation
 pytestmark = pytest.mark.sim
 SMALL = (64, 80)
 STILL, TRIGGER = np.array([0, 0, 0, -1], np.float32), np.array([0, 0, 0, 1], np.float32)
-KEYS = {"zfc": {"zfc_map"}, "blind": set(), "rgb": {"rgb"}, "depth": {"depth"}, "privileged": {"true_map"}}
+KEYS = {
+    "zfc": {"zfc_map"},
+    "ways": {"ways"},
+    "blind": set(),
+    "rgb": {"rgb"},
+    "depth": {"depth"},
+    "privileged": {"true_map"},
+}
 STAGE = slice(20, 24)
 
 
@@ -76,6 +83,15 @@ def test_the_observation_holds_what_its_name_says_and_the_same_every_time(env):
     for obs in first:
         assert set(obs) == {*KEYS[env._shown], "fixation", "proprio"}
         assert env.observation_space.contains(obs)
+
+
+def test_ways_are_remembered_within_an_episode_and_forgotten_with_the_next(opaque):
+    env = opaque("ways")
+    trail = wander(env, seed=4, steps=40)
+    unseen = [float(obs["ways"][1].mean()) for obs in trail]
+    assert unseen[0] == 1.0
+    assert unseen[-1] < 0.95
+    assert env.reset(seed=4)[0]["ways"][1].min() == 1.0
 
 
 def test_action_space_and_time_limit_are_the_documented_ones():

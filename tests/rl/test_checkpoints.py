@@ -130,7 +130,7 @@ def train(*options):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--config", "sonar"), "unknown configuration 'sonar'; choose one of zfc, blind, rgb, depth, privileged, "),
+        (("--config", "sonar"), "unknown configuration 'sonar'; choose one of zfc, ways, blind, rgb, depth, "),
         (("--algorithm", "dqn"), "choose one of sac, ppo"),
         (("--workers", "0"), "--workers must be at least 1"),
         (("--seed", "-1"), "--seed must be within 0..999"),

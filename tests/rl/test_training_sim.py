@@ -107,7 +107,7 @@ def test_its_agent_is_evaluated_and_acts_as_the_model(killed_and_resumed, tmp_pa
     assert "holds another run, with policy_sha256" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("config", ["privileged", "rgb_augmented", "depth"])
+@pytest.mark.parametrize("config", ["ways", "privileged", "rgb_augmented", "depth"])
 def test_other_configurations_train_and_their_agents_act(config, tmp_path):
     short = replace(SHORT, config=config, steps=12, workers=1, learning_starts=4)
     summary = train(short, tmp_path / "run")
