@@ -160,8 +160,8 @@ def _evaluate(config: TrainConfig, out: Path, model: BaseAlgorithm, envs: VecEnv
 
 
 def rank(entry: dict[str, Any]) -> tuple[float, float, float]:
-    """Order of evaluations: by success, then success without collision, then return."""
-    return entry["success"], entry["collision_free"], entry["return"]
+    """Order of evaluations: by success without collision, then any success, then return."""
+    return entry["collision_free"], entry["success"], entry["return"]
 
 
 def card_of(config: TrainConfig, progress: Progress) -> AgentCard:
