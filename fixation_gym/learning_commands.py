@@ -8,7 +8,7 @@ from pathlib import Path
 from fixation_gym.experiments.transfer.config import TransferConfig
 from fixation_gym.gl import select_backend
 from fixation_gym.names import Names
-from fixation_policies.rl.config import TrainConfig, require_learning_packages
+from fixation_policies.rl.config import BEST_FILE, FINAL_FILE, TrainConfig, require_learning_packages
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Train(TrainConfig):
         self.check()
         select_backend()
         from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_policies.rl.train import BEST_FILE, FINAL_FILE, train
+        from fixation_policies.rl.train import train
 
         summary = train(self, self.out, self.resume)
         rates = summary["final"]

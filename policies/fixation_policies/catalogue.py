@@ -21,7 +21,7 @@ from fixation_gym.strangers import is_class_name, load_class, source_hash
 from fixation_policies.base import Policy
 from fixation_policies.baselines import RandomPolicy
 from fixation_policies.paper import PAPER_NAMES, paper_variant
-from fixation_policies.rl.agent_file import read_card
+from fixation_policies.rl.agent_file import read_agent, read_card
 from fixation_policies.rl.config import CONFIGS
 from fixation_policies.servo.servo_policy import ServoPolicy
 from fixation_policies.servo.variants import VARIANT_NAMES, ServoVariant, servo_variant
@@ -49,10 +49,10 @@ def check_policy(name: str) -> None:
     """Check that a policy can be had.
 
     Raises:
-        UsageError: for an unknown name, or a file that is no agent.
+        UsageError: for an unknown name, or a file that is no agent or has no agent's weights.
     """
     if name.endswith(AGENT_SUFFIX):
-        read_card(Path(name))
+        read_agent(Path(name))
     elif name in POLICY_NAMES:
         return
     elif is_class_name(name):

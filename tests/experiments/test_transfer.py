@@ -4,6 +4,7 @@ import csv
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fixation_gym.cli import main
@@ -14,7 +15,8 @@ from fixation_gym.experiments.transfer.run import CSV_FILE, DIFFERENCES_FILE, FI
 from fixation_gym.experiments.transfer.shifts import APPEARANCE, AXES, NONE, SEVERITIES
 from fixation_gym.experiments.transfer.statistics import format_table
 from fixation_policies.rl.agent_file import AgentCard, write_agent
-from fixation_policies.rl.config import TrainConfig
+from fixation_policies.rl.config import CONFIGS, FINAL_FILE, TrainConfig
+from fixation_policies.rl.network import weight_shapes
 
 AXES_HERE = ("light_colour", "object_textures", "latency")
 CONFIG = TransferConfig(
@@ -130,8 +132,18 @@ def test_a_class_that_was_changed_is_tested_again_and_is_no_learner(tmp_path, mo
 @pytest.fixture
 def agent(tmp_path):
     path = tmp_path / "agent.zip"
-    write_agent(path, AgentCard("blind", "sac", (96, 128), "mixed", 0, 1000, 9000, {"torch": "2"}), {})
+    weights = {name: np.zeros(shape) for name, shape in weight_shapes("sac", CONFIGS["blind"], 4).items()}
+    write_agent(path, AgentCard("blind", "sac", (96, 128), "mixed", 0, 1000, 9000, {"torch": "2"}), weights)
     return str(path)
+
+
+@pytest.fixture
+def comparison(tmp_path):
+    """A comparison that was killed before its last run."""
+    for name in ("zfc-0", "blind-0", "zfc-1"):
+        (tmp_path / "comparison" / "runs" / name).mkdir(parents=True)
+        (tmp_path / "comparison" / "runs" / name / FINAL_FILE).touch()
+    return str(tmp_path / "comparison")
 
 
 @pytest.mark.parametrize(
@@ -148,10 +160,13 @@ def agent(tmp_path):
         (["--workers", "0"], "--workers must be at least 1"),
         (["--agent", "AGENT"], "was trained on mixed; --agent takes those trained on opaque"),
         (["--agent", "AGENT,AGENT", "--scenario", "mixed"], "nobody may be tested twice"),
+        (["--runs", "mistyped", "--config", "zfc", "--seeds", "1"], "lacks zfc-0"),
+        (["--runs", "COMPARISON", "--config", "zfc,blind", "--seeds", "2"], "lacks blind-1"),
+        (["--runs", "COMPARISON", "--config", ""], "--runs goes with agents to train"),
     ],
 )
-def test_bad_options_end_as_one_line(options, message, agent, capsys, tmp_path):
-    options = [option.replace("AGENT", agent) for option in options]
+def test_bad_options_end_as_one_line(options, message, agent, comparison, capsys, tmp_path):
+    options = [option.replace("AGENT", agent).replace("COMPARISON", comparison) for option in options]
     assert main(["transfer", *options, "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert message in error

@@ -13,7 +13,7 @@ import pytest
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
 from fixation_policies import agents
-from fixation_policies.catalogue import surroundings
+from fixation_policies.catalogue import check_policy, surroundings
 from fixation_policies.rl.agent_file import AgentCard, read_agent, read_card, write_agent
 from fixation_policies.rl.config import CONFIGS
 from fixation_policies.rl.network import weight_shapes
@@ -128,7 +128,7 @@ def test_weights_of_another_network_are_refused(agent, change):
     weights = {name: array for name, array in {**WEIGHTS, **change}.items() if array is not None}
     write_agent(agent, CARD, weights)
     with pytest.raises(UsageError, match="does not hold the weights of a sac agent; train it again"):
-        read_agent(agent)
+        check_policy(str(agent))  # before any environment is built
 
 
 def test_a_single_array_is_no_agent(agent):

@@ -16,8 +16,8 @@ from fixation_policies.rl import train as training
 from fixation_policies.rl.agent_file import read_card
 from fixation_policies.rl.checkpoints import latest_checkpoint, load_model
 from fixation_policies.rl.compare import CompareConfig, compare
-from fixation_policies.rl.config import TrainConfig
-from fixation_policies.rl.train import BEST_FILE, FINAL_FILE, TENSORBOARD_FOLDER, train
+from fixation_policies.rl.config import BEST_FILE, FINAL_FILE, TrainConfig
+from fixation_policies.rl.train import TENSORBOARD_FOLDER, train
 
 pytestmark = pytest.mark.sim
 SHORT = TrainConfig(

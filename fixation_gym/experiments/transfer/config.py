@@ -14,7 +14,7 @@ from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation.config import SEED_BLOCK, check_scenarios, check_seed, episode_seeds
 from fixation_gym.experiments.transfer.shifts import AXES, NONE, SEVERITIES, Shift, shift
 from fixation_gym.names import Names
-from fixation_policies.rl.config import CONFIGS, TrainConfig
+from fixation_policies.rl.config import CONFIGS, FINAL_FILE, TrainConfig
 
 if TYPE_CHECKING:
     from fixation_gym.experiments.runner import Cell
@@ -67,8 +67,8 @@ class TransferConfig:
     seed: int = 6
     """Chooses the block of episode seeds, as for evaluate."""
     runs: Path | None = None
-    """Folder of a comparison on the same scenario: its runs are not trained again. By default agents are trained in
-    the folder of the results."""
+    """Folder of a finished comparison on the same scenario: its runs are not trained again. By default agents are
+    trained in the folder of the results."""
     quick: bool = False
     """One seed of zfc, 300 decisions, two axes, one episode each, whatever the other options say: minutes, to see that
     everything works."""
@@ -87,6 +87,8 @@ class TransferConfig:
 
         if self.configs:
             self.comparison().check()
+        if self.runs is not None:
+            self._check_runs(self.runs)
         self._check_tested()
         self._check_shifts()
         if not 1 <= self.episodes <= SEED_BLOCK:
@@ -110,6 +112,15 @@ class TransferConfig:
         if len(set(names)) < len(names):
             raise UsageError(f"nobody may be tested twice, got {', '.join(names)}")
 
+    def _check_runs(self, runs: Path) -> None:
+        if not self.configs:
+            raise UsageError(f"--runs goes with agents to train, got {runs} without a --config")
+        folders = [Path(cell["folder"]) for cell in self.smaller().training_cells(runs).values()]
+        missing = [folder.name for folder in folders if not (folder / FINAL_FILE).is_file()]
+        if missing:
+            names = ", ".join(missing)
+            raise UsageError(f"--runs needs the {FINAL_FILE} of every agent, but {folders[0].parent} lacks {names}")
+
     def _check_shifts(self) -> None:
         from fixation_gym.envs.config import resolve_scenario
 
@@ -126,9 +137,9 @@ class TransferConfig:
                 ) from error
 
     def _check_agent(self, path: Path) -> None:
-        from fixation_policies.rl.agent_file import read_card
+        from fixation_policies.rl.agent_file import read_agent
 
-        card = read_card(path)
+        card, _ = read_agent(path)
         if card.scenario != self.scenario:
             raise UsageError(f"{path} was trained on {card.scenario}; --agent takes those trained on {self.scenario}")
 
@@ -149,6 +160,12 @@ class TransferConfig:
             _QUICK if self.quick else TrainConfig(steps=self.steps), scenario=self.scenario, workers=self.env_workers
         )
         return CompareConfig(self.configs, self.seeds, training, (self.scenario,), workers=self.workers)
+
+    def training_cells(self, folder: Path) -> dict[tuple[str, int], Cell]:
+        """The runs of that training by configuration and seed, each with its folder in ``folder``."""
+        from fixation_policies.rl.compare import SERVO
+
+        return {key: cell for key, cell in self.comparison().cells(folder).items() if key[0] != SERVO}
 
     def given(self) -> list[Candidate]:
         """Agents from files, and policies that are not trained."""

@@ -66,9 +66,9 @@ def train_missing(config: TransferConfig, folder: Path) -> list[Candidate]:
     """Train the agents that a folder does not have yet, or go on with them, as ``compare`` does."""
     if not config.configs:
         return []
-    from fixation_policies.rl.compare import SERVO, train_cell
+    from fixation_policies.rl.compare import train_cell
 
-    cells = {key: cell for key, cell in config.comparison().cells(folder).items() if key[0] != SERVO}
+    cells = config.training_cells(folder)
     trained = list(workers.run_cells(list(cells.values()), config.workers, run=train_cell))
     agents = [candidate_agent(summary["config"], summary["seed"], summary["agent"]) for summary in trained]
     order = list(cells)

@@ -17,7 +17,7 @@ import numpy as np
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.files import write_file
-from fixation_policies.rl.config import ALGORITHMS, CONFIGS
+from fixation_policies.rl.config import ALGORITHMS, BEST_FILE, CONFIGS, FINAL_FILE
 from fixation_policies.rl.network import Weights, acting_weights, weight_shapes
 
 FORMAT = 2
@@ -137,4 +137,5 @@ def _read(path: Path) -> tuple[AgentCard, bytes]:
 
 
 def _damaged(path: Path) -> UsageError:
-    return UsageError(f"{path} is damaged or no agent: `fixation-gym train` writes those as best.zip and final.zip")
+    names = f"{BEST_FILE} and {FINAL_FILE}"
+    return UsageError(f"{path} is damaged or no agent: `fixation-gym train` writes those as {names}")

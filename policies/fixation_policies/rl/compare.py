@@ -27,7 +27,7 @@ from fixation_policies.rl.comparison_tables import (
     differences_of,
     table_of,
 )
-from fixation_policies.rl.config import CONFIGS, TrainConfig
+from fixation_policies.rl.config import CONFIGS, FINAL_FILE, TrainConfig
 
 RUNS_FOLDER = "runs"
 CELLS_FILE = "cells.jsonl"
@@ -96,7 +96,7 @@ def train_cell(cell: workers.Cell) -> dict[str, Any]:
     Returns:
         The summary of the training, and ``agent``, the path of the final agent.
     """
-    from fixation_policies.rl.train import FINAL_FILE, train
+    from fixation_policies.rl.train import train
 
     folder = Path(cell["folder"])
     values = {**cell["training"], "image_size": tuple(cell["training"]["image_size"])}

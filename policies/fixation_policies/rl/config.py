@@ -49,6 +49,8 @@ CONFIGS: dict[str, Configuration] = {
     ),
 }
 """Configurations by name."""
+BEST_FILE, FINAL_FILE = "best.zip", "final.zip"
+"""What a training run leaves in its folder: the agent that did best in validation, and the last one."""
 ALGORITHMS = ("sac", "ppo")
 
 TRAIN_SEEDS = 2_000_000_000

@@ -21,7 +21,7 @@ from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, check_same_run, folder_lock, make_folder
 from fixation_policies.rl.agent_file import AgentCard, write_agent
 from fixation_policies.rl.checkpoints import Progress, latest_checkpoint, load_model, read_progress, save_checkpoint
-from fixation_policies.rl.config import TrainConfig
+from fixation_policies.rl.config import BEST_FILE, FINAL_FILE, TrainConfig
 from fixation_policies.rl.environments import closing, draw_new_scenes, start_workers, worker_deaths
 from fixation_policies.rl.hyperparameters import settings_of
 from fixation_policies.rl.network import Weights, acting_weights
@@ -29,7 +29,6 @@ from fixation_policies.rl.overlap import BusyEnvs, learn_meanwhile
 from fixation_policies.rl.validation import validate
 from fixation_policies.rl.watch import Watch
 
-BEST_FILE, FINAL_FILE = "best.zip", "final.zip"
 TENSORBOARD_FOLDER = "tensorboard"
 _KINDS: dict[str, type[BaseAlgorithm]] = {"sac": SAC, "ppo": PPO}
 
