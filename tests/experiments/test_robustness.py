@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -59,7 +60,7 @@ def test_a_run_resumes_and_writes_table_and_figure(tmp_path):
 
     def run(cell):
         calls.append(cell)
-        return {**episode(cell["row"], cell["seed"], 100, 80), "scenario": cell["scenario"]}
+        return {**episode(cell["row"], cell["seed"], 100, 80), **cell}
 
     measure(RobustnessConfig(rows=("jpeg",), scenarios=("opaque",), episodes=2), tmp_path, run)
     assert [(cell["row"], cell["seed"]) for cell in calls] == [(CLEAN, 0), (CLEAN, 1), ("jpeg", 0), ("jpeg", 1)]
@@ -70,6 +71,21 @@ def test_a_run_resumes_and_writes_table_and_figure(tmp_path):
     assert json.loads((tmp_path / "summary.json").read_text())["noise"]["jpeg"]["jpeg_quality"] == 30
     assert (tmp_path / CSV_FILE).read_text().startswith("row,")
     assert (tmp_path / FIGURE_FILE).stat().st_size > 10_000
+
+
+def test_a_row_whose_noise_was_changed_is_measured_again(tmp_path, monkeypatch):
+    calls = []
+
+    def run(cell):
+        calls.append(cell["row"])
+        return {**episode(cell["row"], cell["seed"], 100, 80), **cell}
+
+    config = RobustnessConfig(rows=("lens",), scenarios=("opaque",), episodes=1)
+    measure(config, tmp_path, run)
+    measure(config, tmp_path, run)
+    monkeypatch.setitem(DEGRADATIONS, "lens", replace(DEGRADATIONS["lens"], lens=(-0.2, 0.1, 0.0, 0.0)))
+    assert measure(config, tmp_path, run)["noise"]["lens"]["lens"] == (-0.2, 0.1, 0.0, 0.0)
+    assert calls == [CLEAN, "lens", "lens"]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -63,9 +63,11 @@ class RobustnessConfig:
 
     def cells(self) -> list[Cell]:
         """Episodes row by row: an environment is built for each row and scenario."""
+        from fixation_gym.experiments.robustness.degradations import DEGRADATIONS
+
         scenarios = self.scenarios[:1] if self.quick else self.scenarios
         return [
-            {"row": row, "scenario": scenario, "seed": seed}
+            {"row": row, "scenario": scenario, "seed": seed, "noise": asdict(DEGRADATIONS[row])}
             for row in self.row_names
             for scenario in scenarios
             for seed in episode_seeds(self.seed, self.episode_count)

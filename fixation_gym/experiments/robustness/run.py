@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -19,9 +20,9 @@ from fixation_gym.experiments.runner import Cell, Experiment
 CSV_FILE, FIGURE_FILE = "robustness.csv", "robustness.png"
 
 
-def cell_key(cell: Mapping[str, Any]) -> tuple[str, str, int]:
-    """What tells the results of one run apart."""
-    return cell["row"], cell["scenario"], cell["seed"]
+def cell_key(cell: Mapping[str, Any]) -> tuple[str, str, int, str]:
+    """What tells the results of one run apart. A row whose noise was changed is measured again."""
+    return cell["row"], cell["scenario"], cell["seed"], json.dumps(cell["noise"])
 
 
 EXPERIMENT = Experiment(
@@ -30,7 +31,7 @@ EXPERIMENT = Experiment(
     file=EPISODES_FILE,
     outputs=(CSV_FILE, FIGURE_FILE),
     key=cell_key,
-    content=frozenset({"row", "scenario", "seed", "success", "collision", "counts"}),
+    content=frozenset({"row", "scenario", "seed", "noise", "success", "collision", "counts"}),
     note=lambda value: f"{value['row']}, {value['scenario']}",
 )
 
