@@ -122,7 +122,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         self._arguments: dict[str, Any] = {
             "depth_camera": self._depth_camera,
             "image_size": self._image_size,
-            "sensor_noise": sensor_noise if isinstance(sensor_noise, str) else self.noise,
+            "sensor_noise": self.noise,
             "control_frequency": control_frequency,
             "reward": reward,
             "renderer": renderer,

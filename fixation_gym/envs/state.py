@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from typing import Any
 
@@ -53,9 +53,19 @@ def unpack(state: EnvState, settings: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError("this state is of another kind of environment: set it where it was taken, or in one like that")
     for name, value in settings.items():
         if state.settings[name] != value:
-            there, here = (getattr(setting, "name", setting) for setting in (state.settings[name], value))
+            there, here = _differing(state.settings[name], value)
             raise ValueError(f"this state is of an environment with {name}={there!r}, but this one has {here!r}")
     return pickle.loads(state.contents)
+
+
+def _differing(there: Any, here: Any) -> tuple[Any, Any]:
+    """Two settings that differ: of values with a name that, of others with fields those fields alone."""
+    if getattr(there, "name", None) != getattr(here, "name", None):
+        return there.name, here.name
+    if not (is_dataclass(there) and type(there) is type(here)):
+        return there, here
+    names = [field.name for field in fields(there) if getattr(there, field.name) != getattr(here, field.name)]
+    return tuple({name: getattr(setting, name) for name in names} for setting in (there, here))
 
 
 class Resumable(ABC):

@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 import fixation_gym  # noqa: F401
+from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.envs.pick_env import FixationPickEnv
+from fixation_gym.envs.sensor_noise import SENSOR_NOISE, SensorNoise
 from fixation_gym.envs.zfc_env import FixationPickZFC
 
 pytestmark = pytest.mark.sim
 SIZE = (96, 128)
+NOMINAL = SENSOR_NOISE["nominal"]
 MOVING = {"base": "mixed", "moving_count": (1, 1), "target_moves": 1.0, "push_time": (0.2, 1.0)}
 
 
@@ -127,10 +130,28 @@ def test_foreign_states_are_refused_with_a_sentence():
             r"image_size=\(64, 80\), but this one has",
         ),
         (replace(state, settings={}), "another kind of environment"),
+        (
+            replace(state, settings={**state.settings, "sensor_noise": SensorNoise(read_noise=3.0)}),
+            r"with sensor_noise=\{.*'read_noise': 3\.0.*\}, but this one has \{.*'read_noise': 1\.0.*\}",
+        ),
+        (
+            replace(state, settings={**state.settings, "scenario": SCENARIOS["shelf"]}),
+            "with scenario='shelf', but this one has 'clear'",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             env.set_state(other)
     env.close()
+
+
+def test_a_preset_is_the_same_by_its_name_and_by_its_value():
+    named, valued = FixationPickEnv(image_size=SIZE), FixationPickEnv(image_size=SIZE, sensor_noise=NOMINAL)
+    named.reset(seed=0)
+    valued.set_state(named.get_state())
+    steps = actions(named, 1, 3)
+    assert_same(walk(valued, steps), walk(named, steps))
+    for env in (named, valued):
+        env.close()
 
 
 def test_an_environment_that_was_never_reset_can_be_copied():
