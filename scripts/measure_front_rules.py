@@ -8,9 +8,7 @@ the simulator renders on the grid of the flow. Finished episodes are kept, and t
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +20,10 @@ import tyro
 
 import fixation_gym  # noqa: F401  # registers the environments
 from fixation_gym.envs.truth_view import Truth, TruthView
-from fixation_gym.evaluation.config import SEED_BLOCK
-from fixation_gym.evaluation.workers import prepare_process
+from fixation_gym.evaluation.config import episode_seeds
+from fixation_gym.evaluation.storage import EPISODES_FILE
+from fixation_gym.evaluation.workers import kept, prepare_process
+from fixation_gym.experiments.runner import Cell, Experiment
 from fixation_gym.experiments.scenarios.statistics import bootstrap_ratio
 from fixation_gym.perception import Perception, PerceptionSettings, ZeroFlowSettings
 from fixation_gym.perception.percept import Percept
@@ -128,29 +128,41 @@ def look(env: gymnasium.Env, policy: Any, seed: int, seconds: float) -> dict[str
     return totals
 
 
-def episodes(config: Config) -> Iterator[dict[str, Any]]:
-    """Results of all episodes, those in the file first."""
-    config.out.mkdir(parents=True, exist_ok=True)
-    path = config.out / f"{config.renderer}-{config.seconds:g}s.jsonl"  # other settings have a file of their own
-    kept = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    known = {(item["scenario"], item["seed"]): item for item in kept}
-    for scenario in config.scenarios:
-        env = gymnasium.make("FixationPick-v0", scenario=scenario, renderer=config.renderer, depth_camera=True)
-        policy = make_policy("servo", env)
-        for seed in range(config.seed * SEED_BLOCK, config.seed * SEED_BLOCK + config.episodes):
-            if (scenario, seed) not in known:
-                rules = look(env, policy, seed, config.seconds)
-                known[scenario, seed] = {"scenario": scenario, "seed": seed, "rules": rules}
-                with path.open("a") as file:
-                    file.write(json.dumps(known[scenario, seed]) + "\n")
-            yield known[scenario, seed]
-        env.close()
+EXPERIMENT = Experiment(
+    command="measure_front_rules",
+    unit="episode",
+    file=EPISODES_FILE,
+    outputs=(),
+    key=lambda cell: (cell["scenario"], cell["seed"]),
+    content=frozenset({"scenario", "seed", "rules"}),
+    note=lambda value: value["scenario"],
+)
+
+
+def run_cell(cell: Cell) -> dict[str, Any]:
+    """Look at the episode of a cell."""
+    env, policy = kept(_world, cell["scenario"], cell["renderer"], close=lambda world: world[0].close())
+    return {**cell, "rules": look(env, policy, cell["seed"], cell["seconds"])}
+
+
+def _world(scenario: str, renderer: str) -> tuple[gymnasium.Env, Any]:
+    prepare_process()
+    env = gymnasium.make("FixationPick-v0", scenario=scenario, renderer=renderer, depth_camera=True)
+    return env, make_policy("servo", env)
+
+
+def episodes(config: Config) -> list[dict[str, Any]]:
+    """Results of all episodes; other settings have a folder of their own."""
+    settings = {"renderer": config.renderer, "seconds": config.seconds}
+    seeds = episode_seeds(config.seed, config.episodes)
+    cells = [{"scenario": scenario, "seed": seed, **settings} for scenario in config.scenarios for seed in seeds]
+    with EXPERIMENT.opened(config.out / f"{config.renderer}-{config.seconds:g}s", settings, run_cell, 1) as folder:
+        return folder.results(cells)
 
 
 def main(config: Config) -> None:
     """Measure, and print a table with 95 % intervals, drawn over episodes."""
-    prepare_process()
-    results = list(episodes(config))
+    results = episodes(config)
     print("| material | pixels | measure | " + " | ".join(RULES) + " |")
     print("|---" * (3 + len(RULES)) + "|")
     for kind in (*MATERIALS, "free"):
