@@ -73,7 +73,8 @@ class Ladder(SeveralPolicies):
     """From the paper's algorithm to the servo, one step at a time, on the same episodes; what each step buys."""
 
     scenarios: Annotated[Names, tyro.conf.arg(name="scenario")] = ()
-    """Scenario names, separated by commas, of those in which the target is red; all of them by default."""
+    """Scenario names, separated by commas, of those in which the target is red; by default all of them that
+    need no extra."""
     episodes: int = 20
     """Episodes per scenario and policy."""
     sensor_noise: Fixed[str] = "nominal"
@@ -89,7 +90,7 @@ class Ladder(SeveralPolicies):
         from fixation_policies.ladder import BESIDE, LADDER
 
         red = tuple(name for name, item in SCENARIOS.items() if item.red_target)
-        config = replace(self, scenarios=self.scenarios or red)
+        config = replace(self, scenarios=self.scenarios or tuple(name for name in red if SCENARIOS[name].plain))
         check_names(config.scenarios, red, "scenario")
         config.check()
         select_backend()

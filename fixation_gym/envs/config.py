@@ -138,6 +138,11 @@ class Scenario:
         """Whether the target has the usual colour; otherwise the box in the first image tells which thing it is."""
         return not (self.any_colour or self.target_hue_deg)
 
+    @property
+    def plain(self) -> bool:
+        """Whether MuJoCo's pictures show it as it is; otherwise it is made for ``renderer="mitsuba"``."""
+        return set(self.obstacle_materials) <= set(PLAIN_MATERIALS) and not self.several_mirrors
+
     def _check_obstacles(self) -> None:
         """Check that fields fit together."""
         if not self.target_shapes:

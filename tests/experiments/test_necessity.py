@@ -107,11 +107,13 @@ def read_lines(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
 
 
-def test_by_default_all_scenarios_with_obstacles_are_tried_with_all_ways():
+def test_by_default_all_plain_scenarios_with_obstacles_are_tried_with_all_ways():
     config = NecessityConfig()
+    made_for_mitsuba = {"glass", "chrome", "two_mirrors", "window", "photoreal_mixed"}
+    assert set(scenarios_with_obstacles()) - set(config.scenario_names) == made_for_mitsuba
     assert {"opaque", "bin", "moving_obstacle"} <= set(config.scenario_names)
     assert not {"clear", "moving_target", "distractor"} & set(config.scenario_names)
-    scenarios = len(scenarios_with_obstacles())
+    scenarios = len(config.scenario_names)
     choosing = config.choosing()
     assert len(choosing) == (len(WAYS) + 1) * 20 * scenarios
     judging = config.judging({name: tuple(WAYS)[:2] for name in config.scenario_names})

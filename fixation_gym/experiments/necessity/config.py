@@ -32,7 +32,7 @@ class NecessityConfig:
     """What to try, and with how many processes."""
 
     scenarios: Annotated[Names, tyro.conf.arg(name="scenario")] = ()
-    """Scenario names, separated by commas; by default all with obstacles, with --quick three of them."""
+    """Scenario names, separated by commas; by default all with obstacles that need no extra, with --quick three."""
     quick: bool = False
     """A few ways and four episodes: minutes, to see that everything works."""
     episodes: int | None = None
@@ -74,7 +74,10 @@ class NecessityConfig:
     @property
     def scenario_names(self) -> tuple[str, ...]:
         """Scenarios to try the ways in."""
-        return self.scenarios or (QUICK_SCENARIOS if self.quick else scenarios_with_obstacles())
+        from fixation_gym.envs.config import SCENARIOS
+
+        plain = tuple(name for name in scenarios_with_obstacles() if SCENARIOS[name].plain)
+        return self.scenarios or (QUICK_SCENARIOS if self.quick else plain)
 
     @property
     def episode_count(self) -> int:
