@@ -65,7 +65,7 @@ def _differing(there: Any, here: Any) -> tuple[Any, Any]:
     if not (is_dataclass(there) and type(there) is type(here)):
         return there, here
     names = [field.name for field in fields(there) if getattr(there, field.name) != getattr(here, field.name)]
-    return tuple({name: getattr(setting, name) for name in names} for setting in (there, here))
+    return {name: getattr(there, name) for name in names}, {name: getattr(here, name) for name in names}
 
 
 class Resumable(ABC):

@@ -13,11 +13,10 @@ import numpy as np
 from scipy.special import ndtr
 
 from fixation_gym.geometry.rigid import inverse
-from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.scratch import Float32Array
-from fixation_gym.perception.zero_flow.pictures import Pictures
+from fixation_gym.perception.zero_flow.front_rule import FrontQuestion
 from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQuestion
-from fixation_gym.types import FloatArray, MaskArray
+from fixation_gym.types import MaskArray
 
 _BASELINE_M, _DISPARITY_STD_PX = 0.05, 0.3
 """Of the depth camera: distance of its imagers, m, and noise of its disparities, px of its picture."""
@@ -29,56 +28,32 @@ _BELOW_TABLE = 2.0
 """What seems to be below the table by so many margins moves unlike it, too: the table counts with its tolerance."""
 
 
-def depth_rule(
-    flow: Flow,
-    usable: MaskArray,
-    question: PixelQuestion,
-    twist: FloatArray,
-    fixated: float,
-    margin: float,
-    pictures: Pictures | None,
-) -> PixelAnswers:
+def depth_rule(asked: FrontQuestion) -> PixelAnswers:
     """What a depth camera says is nearer than the fixated object and above the table.
 
     Raises:
         ValueError: if there is no depth camera.
     """
-    if pictures is None or pictures.depth is None:
+    if asked.pictures is None or asked.pictures.depth is None:
         raise ValueError("depth_rule needs what a depth camera measured: make the environment with depth_camera=True")
-    height, width = pictures.depth.shape
-    rows, columns = (_centres(length, count) for length, count in zip((height, width), usable.shape, strict=True))
-    inverse_depth = np.reciprocal(pictures.depth[np.ix_(rows, columns)].astype(np.float32))
-    focal = flow.frame_intrinsics.fx * width / flow.frame_intrinsics.width
-    std = np.full(usable.shape, _DISPARITY_STD_PX / (focal * _BASELINE_M), np.float32)
-    return measured_answers(inverse_depth, std, usable, question)
+    depth, shape, camera = asked.pictures.depth, asked.usable.shape, asked.flow.frame_intrinsics
+    rows, columns = (_centres(length, count) for length, count in zip(depth.shape, shape, strict=True))
+    inverse_depth = np.reciprocal(depth[np.ix_(rows, columns)].astype(np.float32))
+    focal = camera.fx * depth.shape[1] / camera.width
+    std = np.full(shape, _DISPARITY_STD_PX / (focal * _BASELINE_M), np.float32)
+    return measured_answers(inverse_depth, std, asked.usable, asked.exact)
 
 
-def motion_stereo(
-    flow: Flow,
-    usable: MaskArray,
-    question: PixelQuestion,
-    twist: FloatArray,
-    fixated: float,
-    margin: float,
-    pictures: Pictures | None,
-) -> PixelAnswers:
+def motion_stereo(asked: FrontQuestion) -> PixelAnswers:
     """What dense flow between the pictures, triangulated with their poses, says is nearer and above the table.
 
     Raises:
         ValueError: without pictures.
     """
-    return measured_answers(*_triangulated(flow, question, fixated, pictures), usable, question)
+    return measured_answers(*_triangulated(asked), asked.usable, asked.exact)
 
 
-def plane_parallax(
-    flow: Flow,
-    usable: MaskArray,
-    question: PixelQuestion,
-    twist: FloatArray,
-    fixated: float,
-    margin: float,
-    pictures: Pictures | None,
-) -> PixelAnswers:
+def plane_parallax(asked: FrontQuestion) -> PixelAnswers:
     """Whatever moves unlike the table is an obstacle, be it nearer than the fixated object or not.
 
     How far it is, which the memory needs, is triangulated. Without a table nothing has evidence.
@@ -86,11 +61,11 @@ def plane_parallax(
     Raises:
         ValueError: without pictures.
     """
-    inverse_depth, std = _triangulated(flow, question, fixated, pictures)
-    answers = measured_answers(inverse_depth, std, usable, question)
-    table = _surface(question)
+    inverse_depth, std = _triangulated(asked)
+    answers = measured_answers(inverse_depth, std, asked.usable, asked.exact)
+    table = _surface(asked.exact)
     with np.errstate(invalid="ignore"):
-        above, below = inverse_depth - table, (1.0 - _BELOW_TABLE * margin) * table - inverse_depth
+        above, below = inverse_depth - table, (1.0 - _BELOW_TABLE * asked.margin) * table - inverse_depth
         unlike = ndtr(np.maximum(above, below) / std).astype(np.float32)
     supported = answers.supported & np.isfinite(table)
     return answers._replace(p_nearer=np.where(supported, unlike, np.float32(0.5)), supported=supported)
@@ -126,13 +101,12 @@ def _surface(question: PixelQuestion) -> Float32Array:
     return question.surface_rows[:, None] + question.surface_columns
 
 
-def _triangulated(
-    flow: Flow, question: PixelQuestion, fixated: float, pictures: Pictures | None
-) -> tuple[Float32Array, Float32Array]:
+def _triangulated(asked: FrontQuestion) -> tuple[Float32Array, Float32Array]:
     """Inverse depth on the grid, shape (h, w), and its standard deviation, by least squares over both outer pictures.
 
     A point x + u in another picture with pose R, t fulfils (x + u) x (R x + d t) = 0, which is linear in d.
     """
+    flow, question, pictures = asked.flow, asked.exact, asked.pictures
     if pictures is None:
         raise ValueError("motion_stereo and plane_parallax need the pictures that the flow was made of")
     first, middle, last = (np.rint(np.clip(grey, 0.0, 255.0)).astype(np.uint8) for grey in pictures.grey)
@@ -155,7 +129,7 @@ def _triangulated(
     inverse_depth = (a * b).sum(axis=0) / information
     miss = np.sqrt(np.square(a * inverse_depth - b).mean(axis=0)) / scale[0]
     # The question's noise is that of motion over two intervals; here each picture is one interval away.
-    poses = 4.0 * (question.rotation_noise + question.position_noise * fixated**2) / grid.fx**2
+    poses = 4.0 * (question.rotation_noise + question.position_noise * asked.fixated**2) / grid.fx**2
     std = np.sqrt((np.square(_FLOW_STD_PX * scale[0]) + np.float32(poses)) / information)
     return np.where(miss < _AGREE_PX, inverse_depth, np.float32(np.nan)), std
 

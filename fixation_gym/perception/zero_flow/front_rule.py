@@ -5,6 +5,7 @@ Those that measure depth are in ``depth_rules``.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -16,58 +17,40 @@ from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQ
 from fixation_gym.types import FloatArray, MaskArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FrontQuestion:
+    """What a rule is asked: all that is known when pixels are to be told front from behind."""
+
+    flow: Flow
+    """At the centre of three frames, shape (h, w)."""
+    usable: MaskArray
+    """Pixels that may have evidence, shape (h, w)."""
+    exact: PixelQuestion
+    """What the exact test asks: epipolar directions, boundary, support surface, noise."""
+    twist: FloatArray
+    """Mean camera twist [v, w] over the frames, expressed in ``cam``, shape (6,), m/s and rad/s."""
+    fixated: float
+    """Inverse depth of the fixated object, 1/m."""
+    margin: float
+    """What is in front has an inverse depth that is larger by this share at least."""
+    pictures: Pictures | None = None
+    """That the flow was made of; None where nobody gave them."""
+
+
 class FrontRule(Protocol):
     """Says of every pixel on which side of the fixated object it is."""
 
-    def __call__(
-        self,
-        flow: Flow,
-        usable: MaskArray,
-        question: PixelQuestion,
-        twist: FloatArray,
-        fixated: float,
-        margin: float,
-        pictures: Pictures | None,
-    ) -> PixelAnswers:
-        """Answer for every pixel of a flow.
-
-        Args:
-            flow: at the centre of three frames, shape (h, w).
-            usable: pixels that may have evidence, shape (h, w).
-            question: what the exact test asks: epipolar directions, boundary, support surface, noise.
-            twist: mean camera twist [v, w] over the frames, expressed in ``cam``, shape (6,), m/s and rad/s.
-            fixated: inverse depth of the fixated object, 1/m.
-            margin: what is in front has an inverse depth that is larger by this share at least.
-            pictures: that the flow was made of; None where nobody gave them.
-
-        Returns:
-            Side and inverse depth of every pixel, each array of shape (h, w).
-        """
+    def __call__(self, asked: FrontQuestion, /) -> PixelAnswers:
+        """Side and inverse depth of every pixel of the flow, each array of shape (h, w)."""
         ...
 
 
-def exact_rule(
-    flow: Flow,
-    usable: MaskArray,
-    question: PixelQuestion,
-    twist: FloatArray,
-    fixated: float,
-    margin: float,
-    pictures: Pictures | None,
-) -> PixelAnswers:
+def exact_rule(asked: FrontQuestion) -> PixelAnswers:
     """The inverse depth that explains the motion along the epipolar line, against that of the fixated object."""
-    return pixel_answers(flow, usable, question)
+    return pixel_answers(asked.flow, asked.usable, asked.exact)
 
 
-def dot_product_rule(
-    flow: Flow,
-    usable: MaskArray,
-    question: PixelQuestion,
-    twist: FloatArray,
-    fixated: float,
-    margin: float,
-    pictures: Pictures | None,
-) -> PixelAnswers:
+def dot_product_rule(asked: FrontQuestion) -> PixelAnswers:
     """The paper's rule, [x_dot, y_dot] . [v_X, v_Y] < 0; it knows no depth, but heights still tell the table."""
-    above = pixel_answers(flow, usable, question._replace(boundary=np.float32(-np.inf)))
-    return rule_answers(above, dot_product_front(flow, twist), fixated, margin)
+    above = pixel_answers(asked.flow, asked.usable, asked.exact._replace(boundary=np.float32(-np.inf)))
+    return rule_answers(above, dot_product_front(asked.flow, asked.twist), asked.fixated, asked.margin)
