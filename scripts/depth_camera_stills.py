@@ -20,7 +20,7 @@ from measure_front_rules import MATERIALS, in_words, materials
 
 import fixation_gym  # noqa: F401  # registers the environments
 from fixation_gym.envs.truth_view import TruthView
-from fixation_gym.evaluation.config import SEED_BLOCK
+from fixation_gym.evaluation.config import episode_seeds
 from fixation_gym.evaluation.workers import prepare_process
 from fixation_gym.experiments.scenarios.statistics import bootstrap_ratio
 from fixation_gym.types import FloatArray, ImageArray
@@ -49,21 +49,21 @@ def main(config: Config) -> None:
     prepare_process()
     totals: dict[tuple[str, str], list[tuple[float, float]]] = {}
     drawn: list[ImageArray] = []
+    seeds = episode_seeds(config.seed, config.episodes)
     for scenario in config.scenarios:
         env = gymnasium.make("FixationPick-v0", scenario=scenario, renderer=config.renderer, depth_camera=True)
         base: Any = env.unwrapped
-        for seed in range(config.seed * SEED_BLOCK, config.seed * SEED_BLOCK + config.episodes):
+        for seed in seeds:
             seen = env.reset(seed=seed)[0]
             with closing(TruthView(base.model, base.intrinsics)) as view:
                 truth = view.look(base.picture_qpos)
             kinds, depth = materials(truth, base.model), seen["depth"]
-            for kind, answer, pair in (
-                (kind, answer, (np.count_nonzero(kinds[kind] & mask), np.count_nonzero(kinds[kind])))
-                for kind in (*MATERIALS, "free")
-                for answer, mask in zip(ANSWERS, _answers(depth, truth.depth), strict=True)
-            ):
-                totals.setdefault((kind, answer), []).append(pair)
-        drawn.append(np.hstack([seen["rgb"], coloured(truth.depth), coloured(depth)]))
+            for kind in (*MATERIALS, "free"):
+                for answer, mask in zip(ANSWERS, _answers(depth, truth.depth), strict=True):
+                    pair = int(np.count_nonzero(kinds[kind] & mask)), int(np.count_nonzero(kinds[kind]))
+                    totals.setdefault((kind, answer), []).append(pair)
+            if seed == seeds[-1]:
+                drawn.append(np.hstack([seen["rgb"], coloured(truth.depth), coloured(depth)]))
         env.close()
     print("| surface | pixels | " + " | ".join(ANSWERS) + " |")
     print("|---" * (2 + len(ANSWERS)) + "|")

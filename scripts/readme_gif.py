@@ -54,7 +54,7 @@ def frames(video: str, seconds: float) -> Iterator[ImageArray]:
         if not read:
             return
         if index % STRIDE == 0:
-            view = np.hstack([frame[:, WRIST], frame[:, FRONT]])[..., ::-1]
+            view = np.hstack([frame[:, WRIST], frame[:, FRONT]]).astype(np.uint8)[..., ::-1]
             yield np.vstack([view, legend(view.shape[1])])
 
 
@@ -68,4 +68,4 @@ def main(video: str, gif: str, seconds: float = 13.6) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    main(sys.argv[1], sys.argv[2])

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from latex2mathml.converter import convert
+from latex2mathml.converter import convert  # pyright: ignore[reportMissingImports]  # only the docs need it
 
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 _TABLE = re.compile(r"^<!-- table: (\S+) -->$", re.MULTILINE)

@@ -170,9 +170,9 @@ def body() -> Figure:
     line = {"arrowstyle": "-", "color": "0.2"}
     for text, point, height in (
         ("centre of the body:\nwhere the grasp goes", centre, 0.035),
-        ("middle of what is visible:\nwhere the gaze is held", (0.008, 2 * half[1]), 0.125),
+        ("middle of what is visible:\nwhere the gaze is held", np.array([0.008, 2 * half[1]]), 0.125),
     ):
-        axis.annotate(text, point, (0.11, height), fontsize=11, va="center", arrowprops=line)
+        axis.annotate(text, tuple(point), (0.11, height), fontsize=11, va="center", arrowprops=line)
     axis.text(0.145, 0.268, "camera, later", fontsize=11, va="center")
     axis.text(-0.205, 0.2, "camera", fontsize=11, va="center", ha="right")
     axis.text(-0.24, -0.011, "table, at a known height", fontsize=10, va="center")
