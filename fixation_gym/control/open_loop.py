@@ -59,6 +59,9 @@ class OpenLoopGains:
     """Least height of the open fingers above the support surface, m."""
     top_room: float = 0.006
     """However flat the fingers come in, the tool stays this far below the top of the target, m."""
+    past_palm: float = 0.012
+    """How much farther the tool may go than the palm allows, m: how deep a body is, is said by its foremost corner,
+    which need not be in front of the palm."""
     reaim_distance: float = 0.008
     """A grasp is aimed again when the target is farther than this from where it was, m."""
     grasp_timeout: float = 4.0
@@ -99,7 +102,7 @@ class Target:
 
 
 def begin_grasp(T_base_cam: FloatArray, target: Target, time: float, gains: OpenLoopGains) -> Manoeuvre:
-    """Start the grasp: a little below the centre, but no deeper than the fingers are long.
+    """Start the grasp: a little below the centre, but no deeper than the palm allows.
 
     Args:
         T_base_cam: camera pose, shape (4, 4); the hand keeps its orientation.
@@ -111,8 +114,8 @@ def begin_grasp(T_base_cam: FloatArray, target: Target, time: float, gains: Open
     if support is not None and target.reach is not None:
         point[2] = support + gains.grasp_height * (point[2] - support)
     if target.reach is not None:
-        axis = T_base_cam[:3, 2]
-        point -= axis * max(0.0, target.reach + float(axis @ (point - target.point)) - ROBOT.hand.finger_length)
+        axis, deepest = T_base_cam[:3, 2], ROBOT.hand.palm + gains.past_palm
+        point -= axis * max(0.0, target.reach + float(axis @ (point - target.point)) - deepest)
     if support is not None:
         point[2] = max(point[2], lowest_grasp(T_base_cam, float(target.point[2]), support, gains))
     return Manoeuvre(Stage.GRASP, time, point - T_base_cam[:3, :3] @ ROBOT.tool_in_camera)

@@ -58,14 +58,16 @@ class Hand:
     """Of one finger when it closes, m/s."""
     finger_reach: Vector
     """How far the open fingers reach beyond the tool's point along x, y and z of ``cam``, m."""
-    finger_length: float
-    """From the tool's point back to the palm between the fingers, which must not touch the target, m."""
-    palm_room: float
-    """Depth behind the tool's point that even wide things fit into, m; edges of the hand come before the palm."""
     finger_span: Range
     """Widths of a thing that the open fingers get around for sure, and not at all, m."""
     grasp_widths: Range
     """Smallest and largest width of targets, m."""
+
+    @cached_property
+    def palm(self) -> float:
+        """From the tool's point back to the palm between the fingers, m: the front of what is behind it on its axis."""
+        behind = [high[2] for low, high in self.solid if max(low[:2]) < 0.0 < min(high[:2]) and high[2] < 0.0]
+        return -max(behind)
 
     @cached_property
     def parts(self) -> FloatArray:

@@ -18,7 +18,7 @@ _HAND = Hand(
     tool=(0.0, 0.0, 0.097),
     solid=(  # measured on the collision meshes
         ((-0.067, -0.011, -0.044), (0.067, 0.011, 0.010)),  # fingers
-        ((-0.104, -0.033, -0.123), (0.104, 0.033, -0.031)),  # hand
+        ((-0.104, -0.033, -0.123), (0.104, 0.033, -0.031)),  # hand: its front is the palm
         ((-0.046, -0.084, -0.084), (0.046, -0.057, -0.058)),  # camera
         ((-0.055, -0.045, -0.152), (0.090, 0.045, -0.097)),  # flange
     ),
@@ -26,8 +26,6 @@ _HAND = Hand(
     opening=0.08,
     finger_speed=0.10,
     finger_reach=(0.050, 0.011, 0.010),
-    finger_length=0.043,
-    palm_room=0.029,
     finger_span=(0.077, 0.082),
     grasp_widths=(0.025, 0.07),
 )

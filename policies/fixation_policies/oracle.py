@@ -29,6 +29,8 @@ _HELD = 0.045
 """A target whose centre is farther than this from the tool's point is not held, m."""
 _STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
 """Elevation below which an approach is avoided where possible, for round targets and for those the hand turns to."""
+_PALM_ROOM = round(ROBOT.hand.palm - 0.002, 4)
+"""How deep a body may be that is held at its centre, m: 2 mm stay free before the palm."""
 _GAINS = open_loop.OpenLoopGains()
 _MOVED = 0.02
 """A target that is farther than this from where it was aimed at is aimed at again, m."""
@@ -231,7 +233,7 @@ class OraclePolicy:
             "ball": half[0],
             "duck": 0.0,  # only its body is broad enough to be held; what is above it fits between the fingers
         }[spec.shape]
-        return float(np.clip(depth - ROBOT.hand.palm_room, 0.0, 0.02))
+        return float(np.clip(depth - _PALM_ROOM, 0.0, 0.02))
 
     # -- motions -------------------------------------------------------------------------------------------------
 

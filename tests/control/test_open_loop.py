@@ -88,11 +88,12 @@ def test_a_body_is_grasped_below_its_middle_and_a_surface_where_it_is():
     np.testing.assert_allclose(tool_of(begin_grasp(POSE, Target(POINT, None, table), 0.0, GAINS)), POINT, atol=1e-12)
 
 
-def test_the_palm_stays_off_a_body_that_is_deeper_than_the_fingers_are_long():
-    reach = ROBOT.hand.finger_length + 0.01
+def test_a_body_that_is_too_deep_is_held_nearer_to_its_front():
+    deepest = ROBOT.hand.palm + GAINS.past_palm
+    reach = deepest + 0.01
     tool = tool_of(begin_grasp(POSE, Target(POINT, reach, POINT[2] - 0.04), 0.0, GAINS))
     touching = POINT - reach * POSE[:3, 2]
-    assert POSE[:3, 2] @ (tool - touching) == pytest.approx(ROBOT.hand.finger_length)
+    assert POSE[:3, 2] @ (tool - touching) == pytest.approx(deepest)
 
 
 def test_a_grasp_follows_a_pushed_target_and_nothing_less():

@@ -42,6 +42,17 @@ def test_camera_pose_and_jacobian_are_those_of_mujoco(sim):
     np.testing.assert_allclose(jacobian, np.vstack([rotation @ world[:3, :7], rotation @ world[3:, :7]]), atol=1e-9)
 
 
+def test_the_palm_is_where_the_collision_mesh_of_the_hand_ends(sim):
+    model, data = sim.model, sim.data
+    body = next(i for i in range(model.nbody) if model.body(i).name.endswith("right_gripper"))
+    (geom,) = (i for i in range(model.ngeom) if model.geom_bodyid[i] == body and model.geom_contype[i])
+    first, count = model.mesh_vertadr[model.geom_dataid[geom]], model.mesh_vertnum[model.geom_dataid[geom]]
+    vertices = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    approach = sim.arm_state().camera_pose[:3, 2]
+    ahead = (vertices - sim.tool_position() - data.body("robot0_base").xpos) @ approach
+    assert -ahead.max() == pytest.approx(ROBOT.hand.palm, abs=1e-3)
+
+
 def test_torques_are_those_of_the_dense_mass_matrix(sim):
     model, data, arm = sim.model, sim.data, sim._arm_dynamics
     mujoco.mj_step1(model, data)
