@@ -10,6 +10,7 @@ import contextlib
 import errno
 import io
 import json
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ from fixation_gym.learning_commands import Compare, Train, Transfer
 from fixation_gym.names import Names
 from fixation_gym.recording_commands import Record, Replay
 from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, Robustness, print_different
+from fixation_gym.termination import Terminated, orderly_end
 
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 """What a disk that is full or broken says."""
@@ -266,13 +268,14 @@ def _unbox(text: str) -> str:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; errors of use end as one line and exit code 2.
+    """Run a command; errors of use end as one line and exit code 2, signals as one line and 128 plus their number.
 
     Args:
         argv: arguments without the program's name; None for those of the process.
     """
     try:
-        return parse(argv).run()
+        with orderly_end():
+            return parse(argv).run()
     except (UsageError, MissingGLError) as error:
         print(f"fixation-gym: error: {error}", file=sys.stderr)
         return 2
@@ -283,6 +286,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         advice = "give the same command again when it can; commands that resume keep what was finished"
         print(f"fixation-gym: error: cannot write{what} ({error.strerror}); {advice}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         print("fixation-gym: interrupted; what was finished is kept", file=sys.stderr)
-        return 130
+        return 128 + (signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import signal
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -237,10 +238,12 @@ def test_a_full_disk_ends_any_command_in_one_line_and_other_system_errors_are_no
         cli.main(["doctor"])
 
 
-def test_an_interrupted_command_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt() -> dict[str, Any]:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(doctor, "diagnose", interrupt)
-    assert cli.main(["doctor"]) == 130
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_command_says_so(
+    number: int, code: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = signal.getsignal(number)
+    monkeypatch.setattr(doctor, "diagnose", lambda: os.kill(os.getpid(), number))
+    assert cli.main(["doctor"]) == code
     assert "interrupted" in capsys.readouterr().err
+    assert signal.getsignal(number) is before

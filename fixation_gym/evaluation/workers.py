@@ -5,21 +5,17 @@ from __future__ import annotations
 import atexit
 import importlib.util
 import os
-import threading
-import time
 from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
-from functools import cache
 from typing import Any, TypeVar, cast
 
 import gymnasium
 
 from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.rollout import run_episode
+from fixation_gym.evaluation.starter import end_with
 from fixation_policies.base import Policy
 
 BACKENDS = ("loky", "ray")
-_WATCH_S = 0.5
-"""How often a worker looks whether the process that started it is there, s."""
 
 Cell = dict[str, Any]
 """One episode to run: env_id, scenario, policy, detector, seed, sensor_noise, image_size, renderer; JSON-able."""
@@ -132,10 +128,10 @@ def run_cells(
     # Workers inherit this. More threads than cores only get into each other's way.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     if backend == "loky":
-        parallel = joblib.Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered")
+        watch: dict[str, Any] = {"initializer": end_with, "initargs": (os.getpid(),)}
+        parallel = joblib.Parallel(n_jobs=workers, backend="loky", return_as="generator_unordered", **watch)
         try:
-            watched = joblib.delayed(_run_watched)
-            yield from _results(parallel(watched(run, os.getpid(), cell) for cell in cells))
+            yield from _results(parallel(joblib.delayed(run)(cell) for cell in cells))
         except TerminatedWorkerError as error:
             raise UsageError(
                 "a worker process died (killed, out of memory, or a crash of the graphics driver); what is finished is "
@@ -157,27 +153,6 @@ def run_cells(
         raise UsageError(
             f"Ray says {type(error).__name__}: {reason}; finished batches are kept, and the same command goes on"
         ) from error
-
-
-def _run_watched(run: Callable[[Cell], dict[str, Any]], starter: int, cell: Cell) -> dict[str, Any]:
-    """Run a cell in a worker process of the process ``starter``, which may be killed meanwhile."""
-    _end_with(starter)
-    return run(cell)
-
-
-@cache
-def _end_with(starter: int) -> None:
-    """Let this worker process end soon after the one that started it: nobody would take its results.
-
-    Otherwise the workers of a killed run would go on, and write into a folder in which the same command goes on.
-    """
-
-    def watch() -> None:
-        while os.getppid() == starter:
-            time.sleep(_WATCH_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True, name="watch the starter").start()
 
 
 def _join_cluster(workers: int) -> None:

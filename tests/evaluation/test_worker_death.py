@@ -1,5 +1,6 @@
 """Workers that die, or cannot be had."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -37,7 +38,7 @@ sys.path.insert(0, {folder!r})
 from test_worker_death import say_so_and_wait
 from fixation_gym.evaluation.workers import run_cells
 if __name__ == "__main__":
-    list(run_cells([{{"file": sys.argv[1] + str(number)}} for number in range(2)], 2, run=say_so_and_wait))
+    list(run_cells([{{"file": sys.argv[1]}}], 2, run=say_so_and_wait))
 """
 
 
@@ -54,21 +55,28 @@ def wait_until(what, seconds=60.0):
         time.sleep(0.05)
 
 
-def runs(pid):
-    """Whether a process is there and no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
+def session_of(leader):
+    """Processes of a session that are there and no zombies, by what they were started with."""
+    found = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            values = stat.read_text().rpartition(")")[2].split()
+            if int(values[3]) == leader and values[0] != "Z":
+                found[int(stat.parent.name)] = (stat.parent / "cmdline").read_text()
+    return found
 
 
-def test_workers_end_soon_after_a_run_that_was_killed(tmp_path):
-    code = ENDLESS.format(folder=str(Path(__file__).parent))
-    main = subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "worker-")])
-    files = [tmp_path / f"worker-{number}" for number in range(2)]
-    wait_until(lambda: all(file.exists() and file.read_text() for file in files))
+def test_workers_at_work_and_without_work_end_soon_after_a_run_that_was_killed(tmp_path):
+    code, at_work = ENDLESS.format(folder=str(Path(__file__).parent)), tmp_path / "worker"
+    main = subprocess.Popen([sys.executable, "-c", code, str(at_work)], start_new_session=True)
+    wait_until(lambda: at_work.exists() and at_work.read_text())
+    wait_until(lambda: sum("LokyProcess" in line for line in session_of(main.pid).values()) == 2)
     main.kill()
     main.wait()
-    workers = [int(file.read_text()) for file in files]
-    wait_until(lambda: not any(map(runs, workers)), 20.0)
-    assert len(set(workers) | {main.pid}) == 3
+    wait_until(lambda: not session_of(main.pid), 20.0)
+    assert int(at_work.read_text()) != main.pid
+
+
+def test_a_process_whose_starter_is_gone_ends_at_once():
+    code = "import time; from fixation_gym.evaluation.starter import end_with; end_with(-1); time.sleep(60)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=50).returncode == 1

@@ -14,6 +14,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from fixation_gym.errors import UsageError
+from fixation_gym.evaluation.starter import end_with
 from fixation_policies.rl.config import TRAIN_SEEDS, VALIDATION_SEEDS, TrainConfig
 from fixation_policies.rl.decisions import DecisionEnv, FixedEpisodes
 
@@ -49,7 +50,12 @@ def make_learner_env(config: TrainConfig, rank: int) -> gym.Env[Any, Any]:
 
 def start_workers(config: TrainConfig) -> SubprocVecEnv:
     """Environments to learn in, and to validate in between: each takes nearly a gigabyte."""
-    return _spawn([partial(make_learner_env, config, rank) for rank in range(config.workers)])
+    return _spawn([partial(_make_in_worker, config, rank, os.getpid()) for rank in range(config.workers)])
+
+
+def _make_in_worker(config: TrainConfig, rank: int, starter: int) -> gym.Env[Any, Any]:
+    end_with(starter)
+    return make_learner_env(config, rank)
 
 
 def draw_new_scenes(envs: SubprocVecEnv, config: TrainConfig, decisions: int) -> None:
