@@ -43,8 +43,8 @@ class Args:
     """Random steps per scenario and environment."""
     resets: int = 1_000
     """Over so many resets."""
-    piece: int = 50
-    """Resets of a piece."""
+    piece: int = 100
+    """Resets of a piece, between which another environment is built."""
     scenario: Names = SCENARIO_NAMES
     """Scenario names, separated by commas."""
     image_size: tuple[int, int] = (240, 320)
@@ -57,7 +57,7 @@ class Args:
     """Folder of the results."""
 
     def cells(self) -> list[Cell]:
-        """All pieces; those of an environment and a scenario one after the other, for it is kept meanwhile."""
+        """All pieces; the first of every scenario, then the second of every one: part of a run has met all of them."""
         check_names(self.scenario, SCENARIO_NAMES, "scenario")
         if not 1 <= self.piece <= self.resets or self.steps < self.resets or self.resets % self.piece:
             raise UsageError("--steps must be at least --resets, and --resets a multiple of --piece")
@@ -69,9 +69,9 @@ class Args:
                 "resets": self.piece,
                 "mean_steps": self.steps // self.resets,
             }
+            for index in range(self.resets // self.piece)
             for scenario in self.scenario
             for environment in ENVIRONMENTS
-            for index in range(self.resets // self.piece)
         ]
 
 
