@@ -16,7 +16,7 @@ from pathlib import Path
 import tyro
 from kills import ended, load_what_children_share, start
 from result_folders import content, differences
-from small_commands import COMMANDS, REFERENCES, SOURCE
+from small_commands import COMMANDS, REFERENCES, SOURCES
 
 SHARES = (0.1, 0.6)
 """Parts of the results that find room."""
@@ -49,14 +49,20 @@ def wait(name: str, folder: Path, log: Path) -> int:
     return code
 
 
+def run_undisturbed(name: str, out: Path) -> None:
+    """Run a command whose folder is not there yet."""
+    if not (out / name).exists() and wait(name, out / name, out / f"{name}.log") != 0:
+        raise SystemExit(f"{name} does not end without being disturbed; see {out / name}.log")
+
+
 def check(name: str, share: float, out: Path) -> str:
     """Run a command on a disk that gets full, then with room; returns what is wrong."""
     reference, place, log = out / name, out / "disk", out / f"{name}-full.log"
     log.unlink(missing_ok=True)
     mount(place, int(share * sum(path.stat().st_size for path in reference.rglob("*") if path.is_file())))
     try:
-        if name == "report":
-            (place / SOURCE).symlink_to(out / SOURCE)
+        if name in SOURCES:
+            (place / SOURCES[name][1]).symlink_to(out / SOURCES[name][1])
         code = wait(name, place / name, log)
         lines = [line for line in log.read_text().replace("\r", "\n").splitlines() if "error" in line.lower()]
         print(f"{name}, room for {share:.0%}: exit code {code}; {' / '.join(lines)}")
@@ -77,10 +83,10 @@ def run(args: Args) -> int:
     out.mkdir(parents=True, exist_ok=True)
     wrong = {}
     for name in args.only:
-        if not (out / name).exists() and wait(name, out / name, out / f"{name}.log") != 0:
-            raise SystemExit(f"{name} does not end without being disturbed; see {out / name}.log")
-        if name == "evaluate" and not (out / SOURCE).exists():
-            shutil.copytree(out / name, out / SOURCE)
+        if name in SOURCES and not (source := out / SOURCES[name][1]).exists():
+            run_undisturbed(SOURCES[name][0], out)
+            shutil.copytree(out / SOURCES[name][0], source)
+        run_undisturbed(name, out)
         wrong |= {(name, share): text for share in SHARES if (text := check(name, share, out))}
     for (name, share), text in wrong.items():
         print(f"{name}, room for {share:.0%}: {text}", file=sys.stderr)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import tyro
 from result_folders import content, differences
-from small_commands import REFERENCES, SOURCE, main
+from small_commands import REFERENCES, SOURCES, main
 
 from fixation_gym.doctor import installed_versions
 from fixation_gym.evaluation.source import source_commit
@@ -33,17 +33,22 @@ KILLS = {
     "evaluate_workers": 3,
     "export": 7,
     "export_workers": 3,
+    "record": 4,
+    "record_workers": 3,
     "report": 5,
+    "replay": 3,
     "ablate": 4,
     "ladder": 4,
     "distance": 4,
     "necessity": 4,
     "scenarios": 3,
+    "robustness": 3,
+    "transfer": 3,
     "demo": 2,
     "train": 2,
     "compare": 2,
 }
-"""50 in all."""
+"""66 in all."""
 CHAIN = 4
 """Most kills before a run may end."""
 _LOOK_S = 0.04
@@ -174,15 +179,18 @@ class Reference:
 
     def of(self, name: str) -> tuple[Path, tuple[float, float]]:
         """Folder, and times as ``undisturbed`` gives them."""
+        self._have_source(name)
         folder = self._out / REFERENCES.get(name, name)
         if name not in self._times:
             self._times[name] = undisturbed(name, self._out / name)
         if not folder.exists():
             undisturbed(folder.name, folder)
-        source = self._out / SOURCE
-        if name == "evaluate" and not source.exists():
-            shutil.copytree(folder, source)
         return folder, self._times[name]
+
+    def _have_source(self, name: str) -> None:
+        """The folder that a command reads, by an undisturbed run of the command that writes it."""
+        if name in SOURCES and not (source := self._out / SOURCES[name][1]).exists():
+            shutil.copytree(self.of(SOURCES[name][0])[0], source)
 
     def forget(self, name: str) -> None:
         """Time a command again: the first run of an installation also compiles, which takes longer than the rest."""
@@ -216,7 +224,8 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     lines = ["| command | kills | of these with files in the folder | runs | differences | processes left |"]
     lines.append("|---|---|---|---|---|---|")
     for name in KILLS:
-        mine = [row for row in rows if row["command"] == name and row["kills"]]
+        if not (mine := [row for row in rows if row["command"] == name and row["kills"]]):
+            continue
         kills = [kill for row in mine for kill in row["kills"]]
         files, left_over = sum(kill["files"] > 0 for kill in kills), sum(kill["processes_left"] for kill in kills)
         differing = sum(len(row["differences"]) + (row["exit_code"] != 0) for row in mine)

@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-_MAY_DIFFER = ("wall_s", "seconds", "episodes_resumed", "sequences_resumed", "runs_resumed", "folder")
+_MAY_DIFFER = ("wall_s", "wall_ms", "seconds", "perception_ms", "folder", "recording")
+_MAY_DIFFER += ("episodes_resumed", "sequences_resumed", "runs_resumed")
 _NOT_REPEATABLE = ("tensorboard", "checkpoint-")
 """Training goes on from its last checkpoint with other scenes: what it learned differs, how far it came does not."""
 _TRAINED = ("best.zip", "cells.jsonl")

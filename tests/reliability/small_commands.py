@@ -12,15 +12,15 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
 
-from fixation_gym import cli, learning_commands, report_commands
+from fixation_gym import cli, learning_commands, recording_commands, report_commands
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.storage import RUN_FILE
 from fixation_gym.experiments.distance import config as distance_config
 
 SMALLEST = (32, 32)
 SMALL = (64, 80)
-SOURCE = "source"
-"""Folder beside that of the report which it is written from."""
+SOURCES = {"report": ("evaluate", "source"), "replay": ("record", "recordings")}
+"""Commands that read the results of another one, that one, and the folder beside their own in which those are."""
 _TRAINING = {
     "config": "blind",
     "scenario": "clear",
@@ -54,8 +54,23 @@ def export_workers(out: Path) -> int:
     return export(out, workers=2)
 
 
+def record(out: Path, workers: int = 1) -> int:
+    return recording_commands.Record(
+        policy="oracle", scenarios=("clear",), episodes=3, image_size=SMALL, seconds=2.0, workers=workers, out=out
+    ).run()
+
+
+def record_workers(out: Path) -> int:
+    return record(out, workers=2)
+
+
+def replay(out: Path) -> int:
+    recordings = out.parent / SOURCES["replay"][1]
+    return recording_commands.Replay(recording=min(recordings.glob("clear-*")), out=out).run()
+
+
 def report(out: Path) -> int:
-    return report_commands.Report((out.parent / SOURCE,), out=out).run()
+    return report_commands.Report((out.parent / SOURCES["report"][1],), out=out).run()
 
 
 def ablate(out: Path) -> int:
@@ -98,6 +113,16 @@ def necessity(out: Path) -> int:
     return report_commands.Necessity(scenarios=("opaque",), quick=True, episodes=2, beside=(), out=out).run()
 
 
+def robustness(out: Path) -> int:
+    return report_commands.Robustness(rows=("jpeg",), scenarios=("clear",), episodes=1, out=out).run()
+
+
+def transfer(out: Path) -> int:
+    return learning_commands.Transfer(
+        configs=(), policies=("oracle",), axes=("light_colour",), severities=("middle",), episodes=3, out=out
+    ).run()
+
+
 def demo(out: Path) -> int:
     return cli.Demo(policy="blind", scenario=("clear",), out=out).run()
 
@@ -105,11 +130,11 @@ def demo(out: Path) -> int:
 COMMANDS: dict[str, Callable[[Path], int]] = {
     command.__name__: command
     for command in (
-        *(evaluate, evaluate_workers, export, export_workers, report, ablate, ladder),
-        *(distance, necessity, scenarios, demo, train, compare),
+        *(evaluate, evaluate_workers, export, export_workers, record, record_workers, report, replay),
+        *(ablate, ladder, distance, necessity, scenarios, robustness, transfer, demo, train, compare),
     )
 }
-REFERENCES = {"evaluate_workers": "evaluate", "export_workers": "export"}
+REFERENCES = {"evaluate_workers": "evaluate", "export_workers": "export", "record_workers": "record"}
 """Commands that have to leave what another one leaves."""
 
 
