@@ -21,7 +21,7 @@ test-core: full  # tests that need no simulator
 # The environments once more on the newest MuJoCo that was tried; it is put beside .venv and comes first on the path.
 NEWEST_MUJOCO := 4.0.0
 test-newest: full  # tests of the environments on the newest MuJoCo
-	$(VENV)/uv pip install --quiet --target .venv/newest --no-deps mujoco==$(NEWEST_MUJOCO) 'mujoco-core~=$(NEWEST_MUJOCO)'
+	$(VENV)/uv pip install --quiet --target .venv/newest --no-deps mujoco==$(NEWEST_MUJOCO) mujoco-core==$(NEWEST_MUJOCO)
 	PYTHONPATH=.venv/newest $(VENV)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile tests/envs $(ARGS)
 
 # Programs that use the environments under other libraries, each installed beside .venv: half an hour, 10 GB. For nights.
