@@ -34,7 +34,7 @@ def compile_model(extend: SceneExtension | None = None, *, looks: bool = False) 
         looks: with the robot's looks, for pictures for people. Without them the robot is seen by its coarse stand-ins,
             the collision shapes, and only in a mirror; ``qpos`` means the same in both.
     """
-    model = mujoco.MjModel.from_xml_string(build_xml(extend, looks))
+    model = _compiled(build_xml(extend, looks))
     mirror = model.mat("mirror_glass").id
     model.mat_reflectance[np.arange(model.nmat) != mirror] = 0.0
     # Pool shapes are resized at reset, the mid-phase's bounding trees are not. Nobody reads robosuite's sensors.
@@ -53,3 +53,13 @@ def compile_model(extend: SceneExtension | None = None, *, looks: bool = False) 
     for leg in range(1, 5):  # under the table, from where neither wrist camera nor mirror can see them
         model.geom(f"table_leg{leg}_visual").group = scene_mjcf.ROBOT_GROUP
     return TaskModel(model, mujoco.MjData(model), owners)
+
+
+def _compiled(mjcf: str) -> Any:
+    """The model of a text, without what MuJoCo keeps beside it: 60 MB.
+
+    ``MjModel.from_xml_string`` keeps what it read last, and a cache has the decoded files of textures and meshes.
+    """
+    model = mujoco.MjSpec.from_string(mjcf).compile()
+    mujoco.mj_clearCache(mujoco.mj_getCache())
+    return model

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from fixation_gym.envs import robosuite_backend, task_mjcf
+from fixation_gym.envs import robosuite_backend, task_mjcf, task_model
 from fixation_gym.envs.task_model import compile_model
 
 pytestmark = pytest.mark.sim
@@ -66,3 +66,11 @@ def test_only_people_see_the_legs_of_the_table(looks):
     textures = {model.tex(index).name for index in range(model.ntex)}
     assert ("tex-steel-brushed" in textures) == looks
     assert {"tex_table_wood", "tex-light-gray-plaster"} <= textures
+
+
+def test_compiling_is_what_mujoco_does_and_leaves_no_files_in_its_cache(monkeypatch):
+    ours = model_bytes(looks=False)
+    assert mujoco.mj_getCacheSize(mujoco.mj_getCache()) == 0
+    monkeypatch.setattr(task_model, "_compiled", mujoco.MjModel.from_xml_string)
+    assert model_bytes(looks=False) == ours
+    mujoco.mj_clearCache(mujoco.mj_getCache())
