@@ -140,7 +140,7 @@ def test_bad_actions_are_refused_with_what_is_allowed(opaque, action):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"observation": "sonar"}, "'zfc', 'blind', 'rgb', 'depth', 'privileged'"),
+        ({"observation": "sonar"}, "'zfc', 'ways', 'blind', 'rgb', 'depth', 'privileged'"),
         ({"image_size": None}, "needs an image_size"),
         ({"scenario": "fog"}, "clear, opaque"),
     ],
