@@ -12,7 +12,7 @@ AGENT = Path(agents.__file__).parent / "zfc.zip"
 
 
 def main(agent: Path = AGENT, scenario: str = "clear", seed: int = 1) -> bool:
-    """Run one episode; returns whether the object was lifted. This agent knows the scenes of the first sampler only."""
+    """Run one episode; returns whether the object was lifted."""
     place = surroundings(str(agent))  # the environment, observation and image size that the agent was trained with
     env = gym.make(place.env_id, scenario=scenario, image_size=place.image_size, **place.arguments)
     policy = make_policy(str(agent), env)
