@@ -19,7 +19,7 @@ STAGES = {
     "zero-flow map": "zero_flow_test",
     "body": "with_outline",
     "memory": "remember",
-    "looking": "look",
+    "looking": "with_seen",
     "obstacle term": "obstacle_term",
     "phases": "next_phase",
     "choice of way": "chosen_way",
