@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
-from fixation_gym.envs.field_checks import require_names, require_number, require_range, require_shape
+from fixation_gym.envs.field_checks import require_names, require_number, require_range, require_shape, with_fields
 from fixation_gym.envs.object_pool import MAX_OBSTACLES, TARGET_SHAPES
 from fixation_gym.envs.obstacle_kinds import KIND_NAMES
 from fixation_gym.envs.shapes import MATERIALS, PLAIN_MATERIALS
@@ -274,10 +274,4 @@ def resolve_scenario(scenario: str | Mapping[str, Any] | Scenario) -> Scenario:
         raise ValueError(f"scenario must be a name or a mapping, got {type(scenario).__name__}")
     values = dict(scenario)
     base = resolve_scenario(values.pop("base", "clear"))
-    known = {field.name for field in fields(Scenario)}
-    unknown = [key for key in values if key not in known]
-    if unknown:
-        raise ValueError(f"unknown scenario fields {unknown}; choose from {sorted(known | {'base'})}")
-    # JSON has no tuples: lists come back as the tuples the dataclass holds.
-    values = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
-    return Scenario(**{**asdict(base), "name": "custom", **values})
+    return with_fields(base, {"name": "custom", **values}, "scenario fields", "base")

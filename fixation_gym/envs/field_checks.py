@@ -1,6 +1,32 @@
-"""Checks of the fields of a scenario; each raises a ``ValueError`` that says what is allowed."""
+"""Values given as mappings, and checks of their fields; each raises a ``ValueError`` that says what is allowed."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Value = TypeVar("Value", bound="DataclassInstance")
+
+
+def with_fields(base: Value, changes: Mapping[str, Any], what: str, *others: str) -> Value:
+    """A frozen value with fields of a mapping, which may come from JSON: lists stand for tuples.
+
+    Args:
+        base: the value to change.
+        changes: new values by field.
+        what: what messages call the fields.
+        others: what else the mapping might have held.
+    """
+    known = [field.name for field in fields(base)]
+    unknown = [name for name in changes if name not in known]
+    if unknown:
+        raise ValueError(f"unknown {what} {unknown}; choose from {[*others, *known]}")
+    tuples = {name: tuple(value) for name, value in changes.items() if isinstance(value, list)}
+    return replace(base, **{**changes, **tuples})
 
 
 def require_names(field: str, names: tuple[str, ...], allowed: tuple[str, ...]) -> None:

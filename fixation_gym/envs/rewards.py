@@ -11,6 +11,7 @@ from typing import Any
 
 from fixation_gym.envs.arguments import require_choice
 from fixation_gym.envs.config import LIFT_HEIGHT
+from fixation_gym.envs.field_checks import with_fields
 
 REWARDS = ("dense", "sparse")
 
@@ -81,13 +82,10 @@ def resolve_weights(weights: RewardWeights | Mapping[str, Any]) -> RewardWeights
     """
     if isinstance(weights, RewardWeights):
         return weights
-    known = [field.name for field in fields(RewardWeights)]
     if not isinstance(weights, Mapping):
+        known = [field.name for field in fields(RewardWeights)]
         raise ValueError(f"reward_weights must be a mapping from {known} to numbers, got {weights!r}")
-    unknown = [name for name in weights if name not in known]
-    if unknown:
-        raise ValueError(f"unknown reward_weights {unknown}; choose from {known}")
-    return RewardWeights(**weights)
+    return with_fields(RewardWeights(), weights, "reward_weights")
 
 
 def potential(state: TaskState, weights: RewardWeights) -> float:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
+from fixation_gym.envs.field_checks import with_fields
 from fixation_gym.geometry.camera import Lens
 
 _RIG_FIELDS = 8
@@ -187,12 +188,7 @@ def resolve_sensor_noise(noise: str | Mapping[str, Any] | SensorNoise) -> Sensor
     if isinstance(noise, Mapping):
         values = dict(noise)
         base = resolve_sensor_noise(values.pop("base", "ideal"))
-        known = {field.name for field in fields(SensorNoise)}
-        unknown = [key for key in values if key not in known]
-        if unknown:
-            raise ValueError(f"unknown sensor_noise fields {unknown}; choose from {sorted(known | {'base'})}")
-        values = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
-        return SensorNoise(**{**asdict(base), **values})
+        return with_fields(base, values, "sensor_noise fields", "base")
     if not isinstance(noise, str) or noise not in SENSOR_NOISE:
         raise ValueError(f"unknown sensor_noise {noise!r}; choose one of {', '.join(SENSOR_NOISE)}")
     return SENSOR_NOISE[noise]
