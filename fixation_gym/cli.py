@@ -26,7 +26,6 @@ from fixation_gym.experiments.scenarios.config import ScenariosConfig
 from fixation_gym.export.config import ExportConfig
 from fixation_gym.gl import MissingGLError, select_backend
 from fixation_gym.learning_commands import Compare, Train, Transfer
-from fixation_gym.names import Names
 from fixation_gym.recording_commands import Record, Replay
 from fixation_gym.report_commands import Ablate, Ladder, Necessity, Report, Robustness, print_different
 from fixation_gym.termination import Terminated, orderly_end
@@ -44,29 +43,24 @@ class Command(Protocol):
 
 
 @dataclass(frozen=True)
-class Demo:
-    """Film the servo policy in a few episodes of several scenarios: table, MP4 and contact sheet."""
+class Demo(EvaluationConfig):
+    """Film a policy in a few episodes of several scenarios: table, MP4 and contact sheet."""
 
-    policy: str = "servo"
-    """Policy to film."""
-    scenario: Names = EvaluationConfig.scenarios
-    """Scenario names, separated by commas."""
     episodes: int = 1
     """Episodes per scenario."""
-    seed: int = 0
-    """Chooses the block of episode seeds."""
+    workers: tyro.conf.Fixed[int] = 1
+    backend: tyro.conf.Fixed[str] = "loky"
     out: Path = Path("out/demo")
     """Folder of the results; an earlier demonstration there is replaced."""
 
     def run(self) -> int:
         """Film and print the table."""
-        config = EvaluationConfig(self.policy, scenarios=self.scenario, episodes=self.episodes, seed=self.seed)
-        config.check()
+        self.check()
         select_backend()
         from fixation_gym.evaluation.demo import SHEET_FILE, VIDEO_FILE, run_demo
         from fixation_gym.evaluation.report import format_table
 
-        summary = run_demo(config, self.out)
+        summary = run_demo(self, self.out)
         print(format_table(summary["scenarios"]))
         print(f"\n{self.out / VIDEO_FILE}\n{self.out / SHEET_FILE}")
         return 0
@@ -128,13 +122,9 @@ class Distance(DistanceConfig):
         """Measure and print the table."""
         self.check()
         select_backend()
-        from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_gym.experiments.distance.run import CSV_FILE, FIGURE_FILE, measure
-        from fixation_gym.experiments.distance.statistics import format_table
+        from fixation_gym.experiments.distance.run import EXPERIMENT, measure
 
-        print(format_table(measure(self, self.out)))
-        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, FIGURE_FILE)))
-        return 0
+        return EXPERIMENT.show(measure(self, self.out), self.out)
 
 
 @dataclass(frozen=True)
@@ -148,14 +138,9 @@ class Scenarios(ScenariosConfig):
         """Look and print the table."""
         self.check()
         select_backend()
-        from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_gym.experiments.scenarios.run import CSV_FILE, FIGURE_FILE, VIDEO_FILES, measure
-        from fixation_gym.experiments.scenarios.statistics import format_table
+        from fixation_gym.experiments.scenarios.run import EXPERIMENT, measure
 
-        print(format_table(measure(self, self.out)))
-        pictures = (FIGURE_FILE, *VIDEO_FILES.values()) if self.film else ()
-        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, *pictures)))
-        return 0
+        return EXPERIMENT.show(measure(self, self.out), self.out)
 
 
 @dataclass(frozen=True)

@@ -111,11 +111,6 @@ class Transfer(TransferConfig):
         """Train, test and print the table."""
         self.check()
         select_backend()
-        from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_gym.experiments.transfer.run import CSV_FILE, DIFFERENCES_FILE, FIGURE_FILE, measure
-        from fixation_gym.experiments.transfer.statistics import format_table
+        from fixation_gym.experiments.transfer.run import EXPERIMENT, measure
 
-        print(format_table(measure(self, self.out)["rows"]))
-        names = (SUMMARY_FILE, CSV_FILE, DIFFERENCES_FILE, FIGURE_FILE)
-        print("\n" + "\n".join(str(self.out / name) for name in names))
-        return 0
+        return EXPERIMENT.show(measure(self, self.out), self.out)

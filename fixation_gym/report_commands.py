@@ -113,13 +113,9 @@ class Necessity(NecessityConfig):
         """Try the ways and print the table."""
         self.check()
         select_backend()
-        from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_gym.experiments.necessity.run import FIGURE_FILE, ROWS_FILE, TABLE_FILE, measure
-        from fixation_gym.experiments.necessity.statistics import format_table
+        from fixation_gym.experiments.necessity.run import EXPERIMENT, measure
 
-        print(format_table(measure(self, self.out)["table"]))
-        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, TABLE_FILE, ROWS_FILE, FIGURE_FILE)))
-        return 0
+        return EXPERIMENT.show(measure(self, self.out), self.out)
 
 
 @dataclass(frozen=True)
@@ -133,13 +129,9 @@ class Robustness(RobustnessConfig):
         """Measure and print the table."""
         self.check()
         select_backend()
-        from fixation_gym.evaluation.storage import SUMMARY_FILE
-        from fixation_gym.experiments.robustness.run import CSV_FILE, FIGURE_FILE, measure
-        from fixation_gym.experiments.robustness.statistics import format_table
+        from fixation_gym.experiments.robustness.run import EXPERIMENT, measure
 
-        print(format_table(measure(self, self.out)["rows"]))
-        print("\n" + "\n".join(str(self.out / name) for name in (SUMMARY_FILE, CSV_FILE, FIGURE_FILE)))
-        return 0
+        return EXPERIMENT.show(measure(self, self.out), self.out)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ the simulator renders on the grid of the flow. Finished episodes are kept, and t
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -136,6 +137,7 @@ EXPERIMENT = Experiment(
     key=lambda cell: (cell["scenario"], cell["seed"]),
     content=frozenset({"scenario", "seed", "rules"}),
     note=lambda value: value["scenario"],
+    table=lambda summary: as_table(summary["episodes"]),
 )
 
 
@@ -151,20 +153,20 @@ def _world(scenario: str, renderer: str) -> tuple[gymnasium.Env, Any]:
     return env, make_policy("servo", env)
 
 
-def episodes(config: Config) -> list[dict[str, Any]]:
-    """Results of all episodes; other settings have a folder of their own."""
+def main(config: Config) -> None:
+    """Measure and print; other settings have a folder of their own."""
     settings = {"renderer": config.renderer, "seconds": config.seconds}
     seeds = episode_seeds(config.seed, config.episodes)
     cells = [{"scenario": scenario, "seed": seed, **settings} for scenario in config.scenarios for seed in seeds]
-    with EXPERIMENT.opened(config.out / f"{config.renderer}-{config.seconds:g}s", settings, run_cell, 1) as folder:
-        return folder.results(cells)
+    out = config.out / f"{config.renderer}-{config.seconds:g}s"
+    with EXPERIMENT.opened(out, settings, run_cell, 1) as folder:
+        summary = folder.write_summary({"episodes": folder.results(cells)}, {})
+    EXPERIMENT.show(summary, out)
 
 
-def main(config: Config) -> None:
-    """Measure, and print a table with 95 % intervals, drawn over episodes."""
-    results = episodes(config)
-    print("| material | pixels | measure | " + " | ".join(RULES) + " |")
-    print("|---" * (3 + len(RULES)) + "|")
+def as_table(results: Sequence[Mapping[str, Any]]) -> str:
+    """Shares of pixels by material, measure and rule, with 95 % intervals drawn over episodes."""
+    lines = ["| material | pixels | measure | " + " | ".join(RULES) + " |", "|---" * (3 + len(RULES)) + "|"]
     for kind in (*MATERIALS, "free"):
         for measure, (part, whole) in MEASURES.items():
             if (measure == "false alarm") == (kind == "free"):
@@ -177,7 +179,8 @@ def main(config: Config) -> None:
                 }
                 pixels = int(sum(pair[1] for pair in pairs["exact"]))
                 shares = " | ".join(in_words(*bootstrap_ratio(pairs[rule])) for rule in RULES)
-                print(f"| {kind} | {pixels} | {measure} | {shares} |")
+                lines.append(f"| {kind} | {pixels} | {measure} | {shares} |")
+    return "\n".join(lines)
 
 
 def in_words(share: float | None, interval: list[float] | None) -> str:

@@ -54,8 +54,12 @@ def format_table(scenarios: Mapping[str, Mapping[str, Any]]) -> str:
 
     The time is the mean over successful episodes, the distance error the median.
     """
-    rows = [HEADER, *(_row(name, values) for name, values in scenarios.items())]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(HEADER))]
+    return aligned([HEADER, *(_row(name, values) for name, values in scenarios.items())])
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of as many cells each as plain text in columns, the first one as the header."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     return "\n".join([lines[0], "-" * max(map(len, lines)), *lines[1:]])
 

@@ -1,4 +1,9 @@
-"""What the experiments share: a resumable folder of results, and a summary of how it came about."""
+"""What the experiments share: a resumable folder of results, and a summary of how it came about.
+
+Each has a function ``measure(config, out, run=run_cell)`` in its ``run.py``. It runs the cells that the folder ``out``
+does not have yet, writes summary, tables and figure, and returns the summary, as in ``summary.json``. ``config`` must
+have passed ``check``; ``run`` runs one cell, and tests replace it. A folder that cannot be used raises ``UsageError``.
+"""
 
 from __future__ import annotations
 
@@ -40,6 +45,8 @@ class Experiment:
     """Names that every result has."""
     note: Callable[[Result], str]
     """What the progress bar says after a result."""
+    table: Callable[[Mapping[str, Any]], str]
+    """The summary as plain text."""
 
     @contextmanager
     def opened(
@@ -63,6 +70,12 @@ class Experiment:
             check_no_folders(out, self.outputs)
             yield Folder(self, store, description, run, processes, time.monotonic())
         workers.close_kept()
+
+    def show(self, summary: Mapping[str, Any], out: Path) -> int:
+        """Print the table and where the files are; returns the exit code."""
+        files = (out / name for name in (SUMMARY_FILE, *self.outputs))
+        print(self.table(summary), "", *(file for file in files if file.exists()), sep="\n")
+        return 0
 
     def _checked(self, value: Any) -> Result:
         """A stored result.

@@ -12,7 +12,7 @@ from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.workers import kept, prepare_process
 from fixation_gym.experiments.distance.config import DistanceConfig
 from fixation_gym.experiments.distance.sequence import CENTROID_STD_PX, INTRINSICS, Condition, Motion
-from fixation_gym.experiments.distance.statistics import summarise
+from fixation_gym.experiments.distance.statistics import format_table, summarise
 from fixation_gym.experiments.runner import Cell, Experiment
 
 SEQUENCES_FILE, CSV_FILE, FIGURE_FILE = "sequences.jsonl", "rows.csv", "distance.png"
@@ -34,6 +34,7 @@ EXPERIMENT = Experiment(
     key=cell_key,
     content=frozenset({"distance_m", "amplitude_m", "motion", "seed", "results"}),
     note=lambda value: f"{value['distance_m']:g} m, {value['motion']}",
+    table=format_table,
 )
 
 
@@ -73,19 +74,7 @@ def _without_nan(value: Any) -> Any:
 
 
 def measure(config: DistanceConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
-    """Run the sequences that a folder does not have yet, and write summary, CSV and figure.
-
-    Args:
-        config: must have passed ``check``.
-        out: folder; made if needed.
-        run: runs one cell; tests replace it.
-
-    Returns:
-        The summary, as in ``summary.json``.
-
-    Raises:
-        UsageError: if the folder cannot be used.
-    """
+    """Run the sequences that a folder does not have yet, and write summary, CSV and figure; see ``runner``."""
     from fixation_gym.experiments.distance.figure import draw_figure
 
     settings = {"seed": config.seed, "noise": config.noise}

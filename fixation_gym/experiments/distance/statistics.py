@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -196,7 +196,7 @@ def wanted_table(rows: Sequence[Row]) -> list[Row]:
 _CONDITION = ("distance_m", "amplitude_m", "motion", "estimator", "hand_eye_error")
 
 
-def format_table(summary: dict[str, Any]) -> str:
+def format_table(summary: Mapping[str, Any]) -> str:
     """The pose filter's rows as plain text, and the paper's filter beside it, in mm."""
     header = (
         "distance",

@@ -14,7 +14,7 @@ from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import EPISODES_FILE
 from fixation_gym.experiments.necessity.config import ORACLE, Key, NecessityConfig
-from fixation_gym.experiments.necessity.statistics import chosen_ways, summarise
+from fixation_gym.experiments.necessity.statistics import chosen_ways, format_table, summarise
 from fixation_gym.experiments.runner import Cell, Experiment
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ EXPERIMENT = Experiment(
     key=cell_key,
     content=frozenset({"scenario", "member", "seed", "success", "collision"}),
     note=lambda value: f"{value['scenario']}, {value['member']}",
+    table=lambda summary: format_table(summary["table"]),
 )
 
 
@@ -88,19 +89,7 @@ def _scene(scenario: str, seed: int) -> SceneSpec:
 
 
 def measure(config: NecessityConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
-    """Run the episodes that a folder does not have yet, and write summary, CSVs and figure.
-
-    Args:
-        config: must have passed ``check``.
-        out: folder; made if needed.
-        run: runs one cell; tests replace it.
-
-    Returns:
-        The summary, as in ``summary.json``.
-
-    Raises:
-        UsageError: if the folder cannot be used.
-    """
+    """Run the episodes that a folder does not have yet, and write summary, CSVs and figure; see ``runner``."""
     from fixation_gym.experiments.necessity.figure import draw_figure
 
     ways = tuple(config.ways)

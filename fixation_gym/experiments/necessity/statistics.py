@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fixation_gym.evaluation.report import aligned
 from fixation_gym.evaluation.statistics import paired_difference_interval, wilson_interval
 
 Episode = Mapping[str, Any]
@@ -197,9 +198,7 @@ def format_table(table: Sequence[Row]) -> str:
         cells = [row["scenario"], row["best"], f"{100.0 * row['mean_rate']:.0f}%"]
         cells += [f"{row['chosen_on_k']}/{row['chosen_on_n']}", _rate(row, "best"), *(_rate(row, n) for n in names)]
         lines.append((*cells, _difference(row)) if paired else tuple(cells))
-    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
-    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
-    return "\n".join([text[0], "-" * max(map(len, text)), *text[1:], _NOTES])
+    return f"{aligned(lines)}\n{_NOTES}"
 
 
 def _difference(row: Row) -> str:

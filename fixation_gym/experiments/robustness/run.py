@@ -14,7 +14,7 @@ from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import EPISODES_FILE
 from fixation_gym.experiments.robustness.config import RobustnessConfig
 from fixation_gym.experiments.robustness.degradations import DEGRADATIONS
-from fixation_gym.experiments.robustness.statistics import summarise
+from fixation_gym.experiments.robustness.statistics import format_table, summarise
 from fixation_gym.experiments.runner import Cell, Experiment
 
 CSV_FILE, FIGURE_FILE = "robustness.csv", "robustness.png"
@@ -33,6 +33,7 @@ EXPERIMENT = Experiment(
     key=cell_key,
     content=frozenset({"row", "scenario", "seed", "noise", "success", "collision", "counts"}),
     note=lambda value: f"{value['row']}, {value['scenario']}",
+    table=lambda summary: format_table(summary["rows"]),
 )
 
 
@@ -55,19 +56,7 @@ def _world(row: str, scenario: str) -> tuple[Any, Any]:
 
 
 def measure(config: RobustnessConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
-    """Run the episodes that a folder does not have yet, and write summary, CSV and figure.
-
-    Args:
-        config: must have passed ``check``.
-        out: folder; made if needed.
-        run: runs one cell; tests replace it.
-
-    Returns:
-        The summary, as in ``summary.json``.
-
-    Raises:
-        UsageError: if the folder cannot be used.
-    """
+    """Run the episodes that a folder does not have yet, and write summary, CSV and figure; see ``runner``."""
     from fixation_gym.experiments.robustness.figure import draw_figure
 
     noise = {row: asdict(DEGRADATIONS[row]) for row in config.row_names}

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fixation_gym.evaluation.report import aligned
 from fixation_gym.evaluation.statistics import median, paired_difference_interval, wilson_interval
 from fixation_gym.experiments.robustness.degradations import CLEAN, MEANINGS
 from fixation_gym.experiments.robustness.map_scores import map_scores
@@ -79,10 +80,7 @@ def _difference(episodes: Sequence[Episode], clean: Mapping[tuple[str, int], Epi
 def format_table(rows: Sequence[Row]) -> str:
     """The table as plain text."""
     header = ("degradation", "precision (x clean)", "recall", "clear", "known", "Z_f error", "seen", "free", "collided")
-    lines = [header, *(_cells(row) for row in rows)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
-    text = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
-    return "\n".join([text[0], "-" * max(map(len, text)), *text[1:], _NOTES])
+    return f"{aligned([header, *(_cells(row) for row in rows)])}\n{_NOTES}"
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from fixation_gym.evaluation.workers import kept, prepare_process
 from fixation_gym.experiments.runner import Cell, Experiment
 from fixation_gym.experiments.scenarios.config import Key, ScenariosConfig
 from fixation_gym.experiments.scenarios.scenes import CLEAR, MATERIAL_SCENES, SCENES, VARIANTS
-from fixation_gym.experiments.scenarios.statistics import rows_of, summarise
+from fixation_gym.experiments.scenarios.statistics import format_table, rows_of, summarise
 
 if TYPE_CHECKING:
     from fixation_gym.experiments.scenarios.rig import ScenarioRig
@@ -36,6 +36,7 @@ EXPERIMENT = Experiment(
     key=cell_key,
     content=frozenset({"scene", "variant", "seed", "frames"}),
     note=lambda value: f"{value['scene']}, {value['variant']}",
+    table=format_table,
 )
 
 
@@ -66,19 +67,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
 
 
 def measure(config: ScenariosConfig, out: Path, run: Callable[[Cell], dict[str, Any]] = run_cell) -> dict[str, Any]:
-    """Make the runs that a folder does not have yet, and write summary, CSV, figure and videos.
-
-    Args:
-        config: must have passed ``check``.
-        out: folder; made if needed.
-        run: runs one cell; tests replace it.
-
-    Returns:
-        The summary, as in ``summary.json``.
-
-    Raises:
-        UsageError: if the folder cannot be used.
-    """
+    """Make the runs that a folder does not have yet, and write summary, CSV, figure and videos; see ``runner``."""
     cells, settings = config.cells(), {"seed": config.seed, "noise": config.noise}
     if config.renderer != "mujoco":
         settings["renderer"] = config.renderer

@@ -13,7 +13,7 @@ from fixation_gym.evaluation.storage import EPISODES_FILE
 from fixation_gym.experiments.runner import Cell, Experiment
 from fixation_gym.experiments.transfer.config import Candidate, TransferConfig, candidate_agent
 from fixation_gym.experiments.transfer.shifts import NONE, Shift, shift, table_hash
-from fixation_gym.experiments.transfer.statistics import differences, rows
+from fixation_gym.experiments.transfer.statistics import differences, format_table, rows
 
 CSV_FILE, DIFFERENCES_FILE, FIGURE_FILE = "transfer.csv", "differences.csv", "transfer.png"
 Key = tuple[str, int, str, str, str, int]
@@ -33,6 +33,7 @@ EXPERIMENT = Experiment(
     key=cell_key,
     content=frozenset({"name", "training_seed", "digest", "axis", "severity", "seed", "success", "collision"}),
     note=lambda value: f"{value['name']} {value['training_seed']}, {value['axis']} {value['severity']}",
+    table=lambda summary: format_table(summary["rows"]),
 )
 
 
@@ -81,19 +82,9 @@ def measure(
     run: Callable[[Cell], dict[str, Any]] = run_cell,
     train: Callable[[TransferConfig, Path], list[Candidate]] = train_missing,
 ) -> dict[str, Any]:
-    """Train and test what a folder does not have yet, and write summary, CSVs and figure.
+    """Train and test what a folder does not have yet, and write summary, CSVs and figure; see ``runner``.
 
-    Args:
-        config: must have passed ``check``.
-        out: folder; made if needed.
-        run: runs one cell; tests replace it.
-        train: makes the agents; tests replace it.
-
-    Returns:
-        The summary, as in ``summary.json``.
-
-    Raises:
-        UsageError: if the folder cannot be used, or holds runs of another training.
+    ``train`` makes the agents; tests replace it.
     """
     from fixation_gym.experiments.transfer.figure import draw_figure
 
