@@ -16,6 +16,7 @@ INPUTS = (
     ' "observation.images.wrist": {"type": "VISUAL", "shape": [3, 96, 128]}}'
 )
 DIFFUSION = ["--policy.type=diffusion", f"--policy.input_features={INPUTS}", "--policy.crop_shape=[84,112]"]
+DIFFUSION += ["--policy.pretrained_backbone_weights=null"]
 ENVIRONMENT = ["--env.discover_packages_path=fixation_gym.lerobot_env", "--env.type=fixation"]
 ENVIRONMENT += [f"--env.observation_height={SIZE[0]}", f"--env.observation_width={SIZE[1]}", "--env.episode_length=15"]
 
