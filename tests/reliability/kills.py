@@ -214,6 +214,8 @@ def kill_all(args: Args, store: ResultStore[tuple[str, int], dict[str, Any]]) ->
             row = {"chain": number, **chain(name, times, args.out / f"{name}-{number}", rng, most)}
             row["differences"] = differences(content(whole), content(args.out / f"{name}-{number}"))
             store.append(row)
+            if not row["kills"]:
+                reference.forget(name)
             print(
                 f"{name}: {len(row['kills'])} kills, ends with {row['exit_code']}, {row['differences'] or 'the same'}"
             )
