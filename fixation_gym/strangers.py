@@ -1,16 +1,39 @@
-"""Somebody else's classes, named as ``module:Class`` on the command line."""
+"""Somebody else's code: classes named as ``module:Class`` on the command line, and what is behind a door."""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib
 import inspect
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from fixation_gym.errors import UsageError
+
+
+@contextlib.contextmanager
+def whose_code(part: str, code: Any) -> Iterator[str]:
+    """Call code behind a door; yields its name.
+
+    Args:
+        part: what it is, for messages.
+        code: a function, or an object whose class counts.
+
+    Raises:
+        RuntimeError: from whatever it raised, saying whose code it was. Errors of the project's own stay as they are.
+    """
+    named = code if hasattr(code, "__qualname__") else type(code)
+    name = f"{named.__module__}.{named.__qualname__}"
+    try:
+        yield name
+    except Exception as error:
+        if name.startswith("fixation_gym."):
+            raise
+        raise RuntimeError(f"the {part} {name} failed: {type(error).__name__}: {error}") from error
 
 
 def is_class_name(name: str) -> bool:

@@ -20,6 +20,7 @@ from test_pipeline_and_zero_flow import (
 
 from fixation_gym.perception import Perception, PerceptionSettings, ZeroFlowSettings
 from fixation_gym.perception.zero_flow.depth_rules import depth_rule, measured_answers, motion_stereo, plane_parallax
+from fixation_gym.perception.zero_flow.front_rule import exact_rule
 from fixation_gym.perception.zero_flow.pixel_answers import PixelQuestion
 
 
@@ -131,3 +132,24 @@ def test_plane_parallax_calls_what_is_behind_the_target_an_obstacle_too():
 def test_plane_parallax_knows_nothing_without_a_table():
     _, percept, _, _ = run(POSTERS, 8, perception=perception_by(plane_parallax))
     assert not percept.zfc.supported.any()
+
+
+def nothing_for_the_pixels(asked):
+    return exact_rule(asked)._replace(p_nearer=np.zeros(3, np.float32))
+
+
+def broken(asked):
+    raise ZeroDivisionError("my own fault")
+
+
+@pytest.mark.parametrize(
+    ("rule", "error", "message"),
+    [
+        (nothing_for_the_pixels, ValueError, "nothing_for_the_pixels must return PixelAnswers with arrays of shape"),
+        (broken, RuntimeError, r"the front rule .*broken failed: ZeroDivisionError: my own fault"),
+    ],
+)
+def test_a_rule_of_somebody_else_that_is_wrong_is_named(rule, error, message):
+    with pytest.raises(error, match=message) as raised:
+        run(POSTERS, 6, perception=perception_by(rule))
+    assert (raised.value.__cause__ is not None) == (rule is broken)

@@ -11,6 +11,7 @@ import numpy as np
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.detection.segmentation import Segmentation, segmentation_of
 from fixation_gym.perception.detection.tracking import Expectation
+from fixation_gym.strangers import whose_code
 from fixation_gym.types import FloatArray, MaskArray, Observation
 
 
@@ -72,13 +73,8 @@ def detected(
         ValueError: if its mask is none of the image.
         RuntimeError: from whatever the detector raised, naming whose code it was.
     """
-    name = f"{type(detector).__module__}.{type(detector).__qualname__}"
-    try:
+    with whose_code("detector", detector) as name:
         found = detector.detect(observation, expected)
-    except Exception as error:
-        if name.startswith("fixation_gym."):
-            raise
-        raise RuntimeError(f"the detector {name} failed: {type(error).__name__}: {error}") from error
     mask = found.mask if isinstance(found, Sighting) else found
     expects = f"the detector {name} must return a bool array of shape {(intrinsics.height, intrinsics.width)}"
     if not isinstance(mask, np.ndarray):

@@ -14,6 +14,7 @@ from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front, rule_answers
 from fixation_gym.perception.zero_flow.pictures import Pictures
 from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQuestion, pixel_answers
+from fixation_gym.strangers import whose_code
 from fixation_gym.types import FloatArray, MaskArray
 
 
@@ -43,6 +44,21 @@ class FrontRule(Protocol):
     def __call__(self, asked: FrontQuestion, /) -> PixelAnswers:
         """Side and inverse depth of every pixel of the flow, each array of shape (h, w)."""
         ...
+
+
+def answered(rule: FrontRule, asked: FrontQuestion) -> PixelAnswers:
+    """What a rule says, checked.
+
+    Raises:
+        ValueError: if that is no answer for every pixel.
+        RuntimeError: from whatever somebody else's rule raised, naming whose code it was.
+    """
+    with whose_code("front rule", rule) as name:
+        answers = rule(asked)
+    shape = asked.usable.shape
+    if not isinstance(answers, PixelAnswers) or any(np.shape(array) != shape for array in answers):
+        raise ValueError(f"the front rule {name} must return PixelAnswers with arrays of shape {shape}")
+    return answers
 
 
 def exact_rule(asked: FrontQuestion) -> PixelAnswers:

@@ -23,7 +23,7 @@ from fixation_gym.geometry.interaction import epipolar_direction
 from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.scratch import Float32Array, fill
 from fixation_gym.perception.zero_flow.evidence_map import CELLS, UNKNOWN, ZeroFlowSettings, evidence_map
-from fixation_gym.perception.zero_flow.front_rule import FrontQuestion
+from fixation_gym.perception.zero_flow.front_rule import FrontQuestion, answered
 from fixation_gym.perception.zero_flow.pictures import Pictures
 from fixation_gym.perception.zero_flow.pixel_answers import PixelAnswers, PixelQuestion
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
@@ -112,7 +112,8 @@ def zero_flow_test(
         usable &= ~widened_on_grid(self_mask, shape, 1)
     exact = _question(flow, gaze, settings, support_height_m)
     fixated, margin = gaze.inverse_distance, settings.depth_margin
-    answers = settings.rule(FrontQuestion(flow, usable, exact, gaze.twist, fixated, margin, pictures))
+    asked = FrontQuestion(flow, usable, exact, gaze.twist, fixated, margin, pictures)
+    answers = answered(settings.rule, asked)
     if gaze.inverse_distance_std > settings.max_fixation_std * gaze.inverse_distance or flow.imperfect:
         _leave_the_decided(answers)
     outline = _outline(answers, gaze.inverse_distance, settings)
