@@ -15,7 +15,6 @@ from fixation_gym.recordings.trajectory import pose_of
 from fixation_gym.types import FloatArray, ImageArray
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
-CAMERA_TYPE = "sensor_msgs/msg/CameraInfo"
 TRANSFORMS_TYPE = "tf2_msgs/msg/TFMessage"
 POSE_TYPES = {
     "geometry_msgs/msg/PoseStamped": "pose",

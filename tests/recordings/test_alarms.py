@@ -139,7 +139,7 @@ def test_poses_that_are_noisier_than_said_scale_the_std_up_and_are_said(tmp_path
 
 NOTHING = Calibration(
     *(np.zeros(3), np.full(3, 1e-3), np.zeros(3), np.full(3, 2e-3)),
-    *(0.0, 1e-3, 0.0, 3e-3, 0.0, 1.0, 100.0, 0),
+    *(0.0, 1e-3, 0.0, 3e-3, 1.0, 100.0, 0),
 )
 
 

@@ -40,8 +40,6 @@ class Calibration:
     focal: float
     """Relative error of the focal length: above 0, the true one is larger."""
     focal_std: float
-    surprise: float
-    """Sum over these eight values of squares in stds of their prior: above 26 in one of a thousand cases."""
     noise: float
     """How many times larger than stated the noise of poses and centroids is, as a standard deviation."""
     noise_dof: float
@@ -134,7 +132,6 @@ class CalibratingEstimator:
             float(stds[AGE]),
             float(mean[FOCAL]),
             float(stds[FOCAL]),
-            float(np.sum((mean[3:] / self._settings.prior_stds) ** 2)),
             math.sqrt(misfit.nis / misfit.dof) if misfit.dof else math.nan,
             misfit.dof,
             state.restarts,
