@@ -65,7 +65,10 @@ CLIENTS = (
     Client("d3rlpy", "d3rlpy", ("d3rlpy",), "`CQL` off line, `SAC` on line, after `FlattenObservation`"),
     Client("Minari", "minari", ("minari[create,hdf5]",), "`DataCollector`; reads what `export` wrote"),
     Client(
-        "LeRobot", "lerobot", ("lerobot",), "`lerobot-train` (ACT, diffusion) on what `export` wrote, `lerobot-eval`"
+        "LeRobot",
+        "lerobot",
+        ("lerobot[training,evaluation,diffusion]",),  # 0.4.4 has no such extras and all in it
+        "`lerobot-train` (ACT, diffusion) on what `export` wrote, `lerobot-eval`",
     ),
     Client(
         "CleanRL",
