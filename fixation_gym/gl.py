@@ -7,6 +7,7 @@ MuJoCo reads ``MUJOCO_GL`` when it is imported, and robosuite sets it to ``egl``
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import os
 import subprocess
@@ -104,12 +105,14 @@ def _set_mesa_defaults() -> None:
 
 def note_context() -> None:
     """Remember who renders and with what, for processes forked later; call it where a GL context is current."""
-    from OpenGL import GL  # chooses its platform when imported, so not before the backend is selected
+    # Chooses its platform when imported, so not before the backend is selected; all of OpenGL.GL takes 0.16 s.
+    from OpenGL.raw.GL.VERSION import GL_1_0
 
     global _first_process, _renderer_name
     if _first_process is None:
         _first_process = os.getpid()
-        _renderer_name = str(GL.glGetString(GL.GL_RENDERER), "ascii", "replace")  # pyright: ignore[reportArgumentType]
+        name = ctypes.string_at(GL_1_0.glGetString(GL_1_0.GL_RENDERER))  # pyright: ignore[reportArgumentType]
+        _renderer_name = str(name, "ascii", "replace")
 
 
 def renderer_name() -> str:

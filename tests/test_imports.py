@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MUJOCO_FILES = {
     f"fixation_gym/envs/{name}.py"
-    for name in ("pick_sim", "task_model", "contacts", "offscreen", "rendering", "truth_view", "privileged_map")
-} | {"fixation_gym/envs/photoreal/solids.py", "fixation_gym/envs/photoreal/view.py"}
+    for name in ("pick_sim", "task_model", "contacts", "offscreen", "rendering", "textures", "truth_view")
+} | {f"fixation_gym/envs/{name}.py" for name in ("privileged_map", "photoreal/solids", "photoreal/view")}
 FORBIDDEN = {
     "fixation_gym/robots": ("fixation_gym.envs", "gymnasium", "mujoco", "robosuite", "torch"),
     "fixation_gym/geometry": ("cv2", "gymnasium", "mujoco", "robosuite", "torch", "fixation_gym.perception"),

@@ -13,7 +13,6 @@ import cv2
 import mujoco
 import numpy as np
 
-from fixation_gym import gl
 from fixation_gym.envs import scene_mjcf
 from fixation_gym.envs.offscreen import Offscreen
 from fixation_gym.types import FloatArray, ImageArray
@@ -65,10 +64,7 @@ class View:
         model.vis.quality.shadowsize = 1024
         if not full_quality:  # boxes are lit at corners of so many quads along a side: more show in highlights only
             model.vis.quality.numquads = min(model.vis.quality.numquads, 2)
-        self._renderer = Offscreen(model, *fine)
-        if factor > 1:
-            with gl.borrowed_thread():
-                _take_nearest_texels(self._renderer, model)
+        self._renderer = Offscreen(model, *fine, nearest_texels=factor > 1)
         self._pixels = np.empty((*fine, 3), np.uint8)
         self._model = model
         # Images are taken of a copy, so that an exposure before the end of the period leaves the physics untouched.
@@ -115,6 +111,7 @@ class View:
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = int(with_reflections)
         # The sky costs a millisecond even where it is hidden. A mirror may show it from anywhere.
         flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = int(self._full_quality or with_reflections or self._looks_up())
+        self._renderer.upload_textures()
         self._renderer.render(out=self._pixels)
         height, width = self._size
         if self._full_quality:
@@ -130,22 +127,6 @@ class View:
     def close(self) -> None:
         """Free the GL context; may be called twice."""
         self._renderer.close()
-
-
-def _take_nearest_texels(renderer: Offscreen, model: Any) -> None:
-    """Sample far textures at the nearest texel of the nearest resolution instead of blending eight of them.
-
-    Several samples per pixel blend already; in software GL this saves a fifth of the time of a picture.
-    """
-    from OpenGL import GL  # chooses its platform when imported, so not before the backend is selected
-
-    assert renderer._gl_context is not None
-    assert renderer._mjr_context is not None
-    renderer._gl_context.make_current()
-    for texture, kind in zip(renderer._mjr_context.texture, model.tex_type, strict=False):
-        target = GL.GL_TEXTURE_2D if kind == mujoco.mjtTexture.mjTEXTURE_2D else GL.GL_TEXTURE_CUBE_MAP
-        GL.glBindTexture(target, int(texture))
-        GL.glTexParameteri(target, GL.GL_TEXTURE_MIN_FILTER, GL.GL_NEAREST_MIPMAP_NEAREST)
 
 
 def _border_rays(fovy: float, aspect: float) -> FloatArray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fixation_gym.envs import depth_camera
 from fixation_gym.envs.lens import through_lens, wide_pinhole
+from fixation_gym.envs.memory import return_freed_memory
 from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.envs.sensors import measure_image
 from fixation_gym.geometry.camera import Intrinsics
@@ -128,6 +129,7 @@ class Views:
         if self._window is not None:
             self._window.close()
             self._window = None
+        return_freed_memory()
 
 
 def overlay(rgb: ImageArray, percept: Percept | None, front: ImageArray) -> ImageArray:

@@ -1,6 +1,8 @@
 """A closed environment leaves nothing behind: evaluations open one after the other in a process."""
 
 import gc
+import subprocess
+import sys
 
 import gymnasium
 import pytest
@@ -34,3 +36,24 @@ def test_a_closed_environment_can_be_reset_again():
     again, _ = env.reset(seed=3)
     assert (first["rgb"] == again["rgb"]).all()
     env.close()
+
+
+ROUNDS = """
+import gymnasium, fixation_gym
+def resident_mb():
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) / 1024 for line in file if line.startswith("RssAnon:"))
+def round():
+    env = gymnasium.make("FixationPick-v0", image_size=(32, 32))
+    env.reset(seed=0)
+    opened = resident_mb()
+    env.close()
+    return opened - resident_mb()
+round()
+print(round())
+"""
+
+
+def test_a_closed_environment_gives_its_memory_back():
+    result = subprocess.run([sys.executable, "-c", ROUNDS], capture_output=True, text=True, timeout=300, check=True)
+    assert float(result.stdout) > 60.0  # MB: model and textures of the views
