@@ -12,5 +12,15 @@ if find_spec("gymnasium"):
     from gymnasium.envs.registration import register
 
     _MAX_STEPS = round(EPISODE_SECONDS * CONTROL_FREQUENCY)
-    register("FixationPick-v0", "fixation_gym.envs.pick_env:FixationPickEnv", max_episode_steps=_MAX_STEPS)
-    register("FixationPickZFC-v0", "fixation_gym.envs.zfc_env:FixationPickZFC", max_episode_steps=_MAX_STEPS)
+    register(
+        "FixationPick-v0",
+        "fixation_gym.envs.pick_env:FixationPickEnv",
+        max_episode_steps=_MAX_STEPS,
+        vector_entry_point="fixation_gym.envs.vector:pick_workers",
+    )
+    register(
+        "FixationPickZFC-v0",
+        "fixation_gym.envs.zfc_env:FixationPickZFC",
+        max_episode_steps=_MAX_STEPS,
+        vector_entry_point="fixation_gym.envs.vector:zfc_workers",
+    )
