@@ -7,6 +7,7 @@ from typing import Any
 
 from fixation_gym.evaluation.rollout import EpisodeResult
 from fixation_gym.evaluation.statistics import mean, median, minimum, wilson_interval
+from fixation_gym.evaluation.text_table import aligned
 
 CLEARANCE_LIMIT_M = 0.5
 """The environment measures clearances up to here only, and reports this value without obstacles, too."""
@@ -55,13 +56,6 @@ def format_table(scenarios: Mapping[str, Mapping[str, Any]]) -> str:
     The time is the mean over successful episodes, the distance error the median.
     """
     return aligned([HEADER, *(_row(name, values) for name, values in scenarios.items())])
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of as many cells each as plain text in columns, the first one as the header."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([lines[0], "-" * max(map(len, lines)), *lines[1:]])
 
 
 def _row(name: str, values: Mapping[str, Any]) -> tuple[str, ...]:

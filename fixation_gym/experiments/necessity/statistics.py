@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fixation_gym.evaluation.report import aligned
 from fixation_gym.evaluation.statistics import paired_difference_interval, wilson_interval
+from fixation_gym.evaluation.text_table import aligned
 
 Episode = Mapping[str, Any]
 """One line of ``episodes.jsonl``: scenario, member, seed, success (without collision), collision, time_s, phase."""

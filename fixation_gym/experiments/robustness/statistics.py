@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fixation_gym.evaluation.report import aligned
 from fixation_gym.evaluation.statistics import median, paired_difference_interval, wilson_interval
+from fixation_gym.evaluation.text_table import aligned
 from fixation_gym.experiments.robustness.degradations import CLEAN, MEANINGS
 from fixation_gym.experiments.robustness.map_scores import map_scores
 
