@@ -151,7 +151,7 @@ def comparison(tmp_path):
     [
         (["--axis", "fog"], "unknown axis 'fog'; choose one of material_translucent, material_mirror"),
         (["--severity", "4"], "unknown severity '4'; choose one of mild, middle, strong"),
-        (["--config", "sonar"], "unknown configuration 'sonar'; choose one of zfc, blind, rgb"),
+        (["--config", "sonar"], "unknown configuration 'sonar'; choose one of zfc, ways, blind, rgb"),
         (["--policy", "blind"], "--policy takes what is not trained, got 'blind'"),
         (["--scenario", "clear"], "--axis clutter does not go with --scenario clear: obstacle_count (5, 9) needs"),
         (["--scenario", "moon"], "unknown scenario 'moon'"),

@@ -13,7 +13,7 @@ from fixation_gym.errors import UsageError
 from fixation_gym.evaluation.config import EvaluationConfig
 from fixation_gym.evaluation.evaluate import evaluate
 from fixation_policies.rl import train as training
-from fixation_policies.rl.agent_file import read_card
+from fixation_policies.rl.agent_file import read_agent, read_card
 from fixation_policies.rl.checkpoints import latest_checkpoint, load_model
 from fixation_policies.rl.compare import CompareConfig, compare
 from fixation_policies.rl.config import BEST_FILE, FINAL_FILE, TrainConfig
@@ -102,7 +102,8 @@ def test_its_agent_is_evaluated_and_acts_as_the_model(killed_and_resumed, tmp_pa
     assert summary["scenarios"]["clear"]["distance_mae_m"] is not None
     # The same file name with other weights is another policy.
     other = replace(SHORT, seed=1)
-    training.write_agent(folder / FINAL_FILE, training.card_of(other, training.Progress()), {})
+    weights = {name: 0.5 * values for name, values in read_agent(folder / FINAL_FILE)[1].items()}
+    training.write_agent(folder / FINAL_FILE, training.card_of(other, training.Progress()), weights)
     assert main(arguments) == 2
     assert "holds another run, with policy_sha256" in capsys.readouterr().err
 
