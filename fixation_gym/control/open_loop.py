@@ -60,8 +60,7 @@ class OpenLoopGains:
     top_room: float = 0.006
     """However flat the fingers come in, the tool stays this far below the top of the target, m."""
     past_palm: float = 0.012
-    """How much farther the tool may go than the palm allows, m: how deep a body is, is said by its foremost corner,
-    which need not be in front of the palm."""
+    """How much farther the tool may go than the palm allows, m. All grasps were measured so; less was not tried."""
     reaim_distance: float = 0.008
     """A grasp is aimed again when the target is farther than this from where it was, m."""
     grasp_timeout: float = 4.0
