@@ -135,7 +135,7 @@ def require_own_context() -> None:
     if _first_process not in (None, os.getpid()) and not renders_after_fork():
         raise RuntimeError(
             f"a process forked from one that has rendered cannot render with {_renderer_name}: start workers by spawn, "
-            'as with gym.make_vec(..., vector_kwargs={"context": "spawn"}), or fork before the first reset'
+            "as gym.make_vec does by default, or fork before the first reset"
         )
 
 

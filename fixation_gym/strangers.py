@@ -14,6 +14,9 @@ from typing import Any
 
 from fixation_gym.errors import UsageError
 
+_OWN = "fixation_gym.", "fixation_policies."
+"""How the names of the project's own modules begin."""
+
 
 @contextlib.contextmanager
 def whose_code(part: str, code: Any) -> Iterator[str]:
@@ -31,7 +34,7 @@ def whose_code(part: str, code: Any) -> Iterator[str]:
     try:
         yield name
     except Exception as error:
-        if name.startswith("fixation_gym."):
+        if name.startswith(_OWN):
             raise
         raise RuntimeError(f"the {part} {name} failed: {type(error).__name__}: {error}") from error
 

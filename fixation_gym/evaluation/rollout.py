@@ -15,7 +15,7 @@ from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.evaluation.scene_truth import scene_of
 from fixation_gym.evaluation.statistics import mean, minimum, root_mean_square
 from fixation_gym.evaluation.trace import Trace, TraceRecorder
-from fixation_policies.base import Estimate, Policy
+from fixation_policies.base import Estimate, Policy, decision
 
 APPROACH = "approach"
 GRASP = "grasp"
@@ -128,7 +128,7 @@ def run_episode(
     reward_terms: dict[str, float] = {}
     terminated = truncated = False
     while not (terminated or truncated):
-        action = policy.act(obs)
+        action = decision(policy, obs)
         estimate = getattr(policy, "estimate", None)
         _show_percept(env, policy)
         recorder.add(_sensed(env, obs), info, estimate)

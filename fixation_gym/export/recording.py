@@ -19,6 +19,7 @@ from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow.evidence_map import CELLS, UNKNOWN
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray
+from fixation_policies.base import decision
 
 WRIST, MAP = "observation.images.wrist", "observation.images.zero_flow_map"
 VIDEOS = (WRIST, MAP)
@@ -137,7 +138,7 @@ def _decisions(cell: Mapping[str, Any]) -> Iterator[_Decision]:
     done = False
     while not done:
         sensed, seen = base.sensed, _without_picture(obs)
-        action = policy.act(obs)
+        action = decision(policy, obs)
         percept: Percept | None = getattr(policy, "percept", None) or base.percept
         row = {
             "observation.state": [*sensed["joint_pos"], *sensed["gripper_width"]],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import lru_cache
 
@@ -42,6 +43,7 @@ from fixation_gym.perception.zero_flow.zero_flow import (
     unknown_zero_flow,
     zero_flow_test,
 )
+from fixation_gym.strangers import whose_code
 from fixation_gym.types import FloatArray, MaskArray, Observation
 
 _STAMP_ROUNDING_S = 1e-3
@@ -151,18 +153,24 @@ class Perception:
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         twist = self._twist(observation, T_base_cam)
         frame = Frame(observation.time, grey, T_base_cam, twist, segmentation, depth=observation.depth)
-        self._estimator.add_frame(frame)
+        with self._estimating():
+            self._estimator.add_frame(frame)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
             self._frames.clear()
         self._frames.append(frame)
         flow = self._flow()
         zero_flow = self._look_for_obstacles(flow)
-        fixation = self._estimator.fixation(T_base_cam, segmentation)
+        with self._estimating():
+            fixation = self._estimator.fixation(T_base_cam, segmentation)
         if segmentation.visible:
             self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
         body = self._fit_body(frame, fixation)
         return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam, body)
+
+    def _estimating(self) -> AbstractContextManager[str]:
+        """Call the estimator, which may be somebody else's."""
+        return whose_code("distance estimator", self._estimator)
 
     def _check(self, observation: Observation) -> None:
         expected = (self._intrinsics.height, self._intrinsics.width, 3)
@@ -201,7 +209,8 @@ class Perception:
         if len(self._frames) < 3:
             return invalid_flow(self._frames[0].time, self._working)
         first, middle, last = self._frames
-        fixated, _ = inverse_distance(self._estimator, middle.T_base_cam)
+        with self._estimating():
+            fixated, _ = inverse_distance(self._estimator, middle.T_base_cam)
         outer = (inverse(frame.T_base_cam) @ middle.T_base_cam for frame in (first, last))
         to_first, to_last = (plane_homography(T, fixated, self._working) for T in outer)
         return estimate_flow(
@@ -223,8 +232,9 @@ class Perception:
         if not (middle.segmentation.visible and last.segmentation.visible):
             return unknown_zero_flow(*shape)
         twist = mean_twist(first.T_base_cam, last.T_base_cam, last.time - first.time)
-        self._estimator.add_flow(flow, (first, middle, last))
-        fixated = inverse_distance(self._estimator, middle.T_base_cam)
+        with self._estimating():
+            self._estimator.add_flow(flow, (first, middle, last))
+            fixated = inverse_distance(self._estimator, middle.T_base_cam)
         gaze = Gaze(twist, *fixated, middle.segmentation.mask, middle.T_base_cam)
         settings, pictures = self._settings.zero_flow, _pictures((first, middle, last))
         return zero_flow_test(flow, gaze, settings, self._self_mask, self.support_height_m, pictures)

@@ -25,6 +25,7 @@ from fixation_gym.recordings.pictures import depth_over
 from fixation_gym.recordings.writer import LayoutWriter
 from fixation_gym.replay.looks import Straightener
 from fixation_gym.types import FloatArray, MaskArray, Observation
+from fixation_policies.base import decision
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def _record_episode(out: Path, seconds: float, cell: workers.Cell) -> dict[str, 
                 pose, joints = _at(stamp, sensed, history)
                 writer.add(stamp, straightener.image(sensed["rgb"]), pose, joints, mask, depth, depth_over(mask, depth))
                 count, last = count + 1, stamp
-            obs, _, terminated, truncated, info = env.step(policy.act(obs))
+            obs, _, terminated, truncated, info = env.step(decision(policy, obs))
             done = terminated or truncated or float(base.sensed["time"][0]) >= seconds
     outcome = bool(info["success"]), bool(info["collision"])
     return asdict(RecordedEpisode(scenario, seed, folder, count, *outcome))

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fixation_gym.strangers import whose_code
+
 if TYPE_CHECKING:
     from fixation_gym.envs.pick_sim import PickSim
     from fixation_gym.envs.scene import SceneSpec
@@ -41,6 +43,16 @@ class Policy(Protocol):
     def act(self, obs: Mapping[str, Any]) -> Action:
         """Action of shape (7,) for an observation."""
         ...
+
+
+def decision(policy: Policy, obs: Mapping[str, Any]) -> Action:
+    """What a policy does about an observation.
+
+    Raises:
+        RuntimeError: from whatever somebody else's policy raised, naming whose code it was.
+    """
+    with whose_code("policy", policy):
+        return policy.act(obs)
 
 
 class SimulatedWorld(Protocol):

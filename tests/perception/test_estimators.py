@@ -33,6 +33,15 @@ def test_every_estimator_finds_the_distance_from_images(name):
     assert 0.0 < fixation.distance_std_m < 0.5 * depth
 
 
+def test_a_stranger_s_estimator_that_fails_is_named():
+    class Broken(PoseEstimator):
+        def add_frame(self, frame):
+            raise ZeroDivisionError("my own fault")
+
+    with pytest.raises(RuntimeError, match=r"the distance estimator .*Broken failed: ZeroDivisionError: my own fault"):
+        follow(Perception(CAMERA, estimator=Broken()), range(2))
+
+
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_before_the_first_sight_and_after_a_reset_every_estimator_has_the_first_guess(name):
     estimator = ESTIMATORS[name][0]()

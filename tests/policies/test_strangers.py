@@ -9,6 +9,8 @@ import pytest
 from fixation_gym.errors import UsageError
 from fixation_gym.strangers import is_class_name
 from fixation_policies import catalogue
+from fixation_policies.base import decision
+from fixation_policies.baselines import RandomPolicy
 from fixation_policies.catalogue import check_detector, check_policy, make_policy, source_hashes
 
 CODE = """
@@ -33,6 +35,10 @@ class Blind:
 class Mute:
     def reset(self, seed=None):
         pass
+
+class Broken(Still):
+    def act(self, obs):
+        raise KeyError("speed")
 
 number = 3
 """
@@ -113,3 +119,15 @@ def test_changed_code_is_another_policy(module, tmp_path):
     (tmp_path / f"{module}.py").write_text(CODE + "\n# changed\n")
     assert source_hashes(f"{module}:Still", f"{module}:Blind") != before
     assert source_hashes("servo", "box") == {}
+
+
+def test_a_failing_policy_is_named_and_keeps_its_traceback(module):
+    broken = make_policy(f"{module}:Broken", Env())
+    with pytest.raises(RuntimeError, match=rf"the policy {module}.Broken failed: KeyError: 'speed'") as error:
+        decision(broken, {})
+    assert isinstance(error.value.__cause__, KeyError)
+
+
+def test_what_the_project_s_own_policies_raise_stays_as_it_is():
+    with pytest.raises(ZeroDivisionError):
+        decision(RandomPolicy(hold_steps=0), {})

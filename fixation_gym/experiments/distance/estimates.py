@@ -21,7 +21,8 @@ from fixation_gym.perception.distance.calibrating_filter import CalibratingSetti
 from fixation_gym.perception.distance.calibration_model import Sighting
 from fixation_gym.perception.distance.estimator import DistanceEstimator, Frames, PoseEstimator
 from fixation_gym.perception.distance.fixation_constraint import gaze_drift
-from fixation_gym.perception.distance.flow_filters import FlowFilterSettings, Kind
+from fixation_gym.perception.distance.flow_filters import FlowFilterSettings
+from fixation_gym.perception.distance.flow_models import Kind
 from fixation_gym.perception.distance.flow_samples import FLOW_NAMES, FlowName
 from fixation_gym.perception.distance.following import Frame, mean_variance
 from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState, Fixation

@@ -19,7 +19,8 @@ import numpy as np
 from fixation_gym.perception.detection.segmentation import Segmentation
 from fixation_gym.perception.distance import flow_filters, pose_filter
 from fixation_gym.perception.distance.fixation_constraint import ConstrainedGaze, ConstraintSettings, gaze_drift
-from fixation_gym.perception.distance.flow_filters import FlowFilterState, FlowSamples, Kind
+from fixation_gym.perception.distance.flow_filters import FlowFilterState, FlowSamples
+from fixation_gym.perception.distance.flow_models import Kind
 from fixation_gym.perception.distance.flow_samples import edge_samples
 from fixation_gym.perception.distance.following import (
     Frame,

@@ -1,12 +1,7 @@
 """Distance from measured twist and optic flow: the paper's filter with the fixation constraint, and one without it.
 
 Both are extended Kalman filters whose motion is driven by white jerk (Battaje & Brock 2022, section III, with the signs
-of ``geometry.interaction``). Flow u at (x, y) is u = d A v + B w.
-
-* ``HARD`` has 9 states [v (3), w_Z, a (3), alpha_Z, d] and knows that the fixated point stands still in the image, so
-  w_X = d v_Y and w_Y = -d v_X: the distance is the ratio of translation and rotation, flow only checks it.
-* ``FREE`` has 15 states [v (3), w (3), a (3), alpha (3), n (3)] and no constraint. n is the target's plane, n . P = 1,
-  so the inverse depth at (x, y) is n . (x, y, 1), exact for any slant, and n_dot = (n . v) n - w x n.
+of ``geometry.interaction``). Flow u at (x, y) is u = d A v + B w. ``flow_models`` has their states.
 
 Units: m, rad, s; twists in the camera frame, image coordinates normalised. Value in, value out.
 """
@@ -14,16 +9,12 @@ Units: m, rad, s; twists in the camera frame, image coordinates normalised. Valu
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from fixation_gym.geometry.interaction import rotation_part, translation_part
-from fixation_gym.geometry.rigid import cross
-from fixation_gym.geometry.twist import skew
+from fixation_gym.perception.distance.flow_models import MODELS, FlowModel, Kind
 from fixation_gym.types import FloatArray, MaskArray
-
-Kind = Literal["hard", "free"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,41 +76,37 @@ class FlowFilterState:
     age: float = 0.0
     """Time since the first frame, s."""
 
+    @property
+    def model(self) -> FlowModel:
+        """What its states mean."""
+        return MODELS[self.kind]
+
 
 def initialise(kind: Kind, settings: FlowFilterSettings) -> FlowFilterState:
     """State before any motion: at rest, at the guessed distance, facing the camera."""
-    d = 1.0 / settings.initial_distance_m
-    d_std = settings.initial_relative_std * d
-    speed, acceleration = 0.2, 0.2
-    if kind == "hard":
-        mean = np.array([*np.zeros(8), d])
-        stds = [speed] * 3 + [1.0] + [acceleration] * 3 + [1.0, d_std]
-    else:
-        mean = np.array([*np.zeros(14), d])
-        slant = settings.slant_std * d
-        stds = [speed] * 3 + [1.0] * 3 + [acceleration] * 3 + [1.0] * 3 + [slant, slant, d_std]
-    return FlowFilterState(kind, mean, np.diag(np.square(stds)))
+    d, model = 1.0 / settings.initial_distance_m, MODELS[kind]
+    speed, turning = [0.2] * 3, [1.0] * (model.motion - 3)
+    stds = [*speed, *turning, *speed, *turning, *_depth_stds(d, model, settings)]
+    return FlowFilterState(kind, np.array([*np.zeros(model.size - 1), d]), np.diag(np.square(stds)))
+
+
+def _depth_stds(d: float, model: FlowModel, settings: FlowFilterSettings) -> FloatArray:
+    """Standard deviations of the states of depth before any motion."""
+    stds = np.full(model.size - 2 * model.motion, settings.slant_std * d)
+    stds[-1] = settings.initial_relative_std * d
+    return stds
 
 
 def predict(state: FlowFilterState, dt: float, settings: FlowFilterSettings) -> FlowFilterState:
     """Let ``dt`` s pass."""
-    motion = 4 if state.kind == "hard" else 6
-    size = state.mean.size
-    F = np.eye(size)
+    model = state.model
+    motion, depths = model.motion, slice(2 * model.motion, None)
+    rate, by_state = model.depth_rate(state.mean)
+    F, mean = np.eye(model.size), state.mean.copy()
     F[:motion, motion : 2 * motion] = dt * np.eye(motion)
-    mean = state.mean.copy()
+    F[depths] += dt * by_state
     mean[:motion] += dt * mean[motion : 2 * motion]
-    v = state.mean[:3]
-    if state.kind == "hard":
-        d = state.mean[8]
-        mean[8] += d * d * v[2] * dt
-        F[8, 8], F[8, 2] = 1.0 + 2.0 * d * v[2] * dt, d * d * dt
-    else:
-        w, n = state.mean[3:6], state.mean[12:]
-        mean[12:] += dt * ((n @ v) * n - cross(w, n))
-        F[12:, :3] = dt * np.outer(n, n)
-        F[12:, 3:6] = dt * skew(n)
-        F[12:, 12:] += dt * ((n @ v) * np.eye(3) + np.outer(n, v) - skew(w))
+    mean[depths] += dt * rate
     cov = F @ state.cov @ F.T + _process_noise(state, dt, settings)
     return _bounded(replace(state, mean=mean, cov=cov, age=state.age + dt), settings)
 
@@ -133,15 +120,12 @@ def _bounded(state: FlowFilterState, settings: FlowFilterSettings) -> FlowFilter
     mean[-1] = min(max(d, MIN_INVERSE_DEPTH), MAX_INVERSE_DEPTH)
     if d < MIN_INVERSE_DEPTH:  # its covariance says that it may be nearer
         return replace(state, mean=mean)
-    if state.kind == "free":
-        mean[12:14] *= MAX_INVERSE_DEPTH / d
-    return _forget_depth(replace(state, mean=mean), settings)
+    return _forget_depth(replace(state, mean=state.model.tilted(mean, MAX_INVERSE_DEPTH / d)), settings)
 
 
 def _process_noise(state: FlowFilterState, dt: float, settings: FlowFilterSettings) -> FloatArray:
     """White jerk on the motion, random walk on the depth."""
-    motion = 4 if state.kind == "hard" else 6
-    d = state.mean[-1]
+    motion, d = state.model.motion, state.mean[-1]
     jerk = settings.onset_jerk if state.age < settings.onset_s else settings.jerk
     jerks = np.full(motion, jerk * d)
     jerks[:3] = jerk
@@ -176,9 +160,9 @@ def update(
     """
     if not np.all(np.isfinite(twist)):
         return state
-    h, H = _twist_model(state)
+    h, H = state.model.twist(state.mean)
     noise = np.array(twist_cov, dtype=np.float64)
-    if state.kind == "hard" and gaze_rate is not None:
+    if state.model.fixates and gaze_rate is not None:
         noise[[3, 4], [3, 4]] += _DRIFT_FRAMES * np.square(gaze_rate[::-1])
     information = np.linalg.inv(noise)
     residual = twist - h
@@ -197,34 +181,12 @@ def update(
     return _forget_depth(updated, settings) if suspicious >= settings.alarm_count else updated
 
 
-def _twist_model(state: FlowFilterState) -> tuple[FloatArray, FloatArray]:
-    """Expected twist, shape (6,), and its derivative by the state, shape (6, n)."""
-    H = np.zeros((6, state.mean.size))
-    if state.kind == "free":
-        H[:6, :6] = np.eye(6)
-        return state.mean[:6], H
-    v, roll, d = state.mean[:3], state.mean[3], state.mean[8]
-    H[:3, :3] = np.eye(3)
-    H[3, 1], H[3, 8] = d, v[1]
-    H[4, 0], H[4, 8] = -d, -v[0]
-    H[5, 3] = 1.0
-    return np.array([*v, d * v[1], -d * v[0], roll]), H
-
-
 def _flow_model(state: FlowFilterState, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Expected flow, shape (m, 2), and its derivative by the state, shape (m, 2, n)."""
     A, B = translation_part(points[:, 0], points[:, 1]), rotation_part(points[:, 0], points[:, 1])
-    twist, H_twist = _twist_model(state)
+    twist, H_twist = state.model.twist(state.mean)
+    d, d_by_state = state.model.inverse_depths(state.mean, points)
     moved = A @ twist[:3]
-    if state.kind == "hard":
-        d = np.full(len(points), state.mean[8])
-        d_by_state = np.zeros((len(points), 9))
-        d_by_state[:, 8] = 1.0
-    else:
-        rays = np.column_stack([points, np.ones(len(points))])
-        d = rays @ state.mean[12:]
-        d_by_state = np.zeros((len(points), 15))
-        d_by_state[:, 12:] = rays
     flow = d[:, None] * moved + B @ twist[3:]
     by_twist = np.concatenate([d[:, None, None] * A, B], axis=2) @ H_twist
     return flow, by_twist + moved[:, :, None] * d_by_state[:, None, :]
@@ -237,10 +199,10 @@ def _flow_information(
     points, cov = samples.points[finite], samples.cov[finite]
     h, H = _flow_model(state, points)
     residual = samples.flow[finite] - h
-    if state.kind == "hard":
+    if state.model.fixates:
         spread = np.linalg.norm(points - points.mean(axis=0), axis=1)
-        model = settings.slant_std * state.mean[8] * spread * np.linalg.norm(state.mean[:2])
-        cov = cov + model[:, None, None] ** 2 * np.eye(2)
+        slanted = settings.slant_std * state.mean[-1] * spread * np.linalg.norm(state.mean[:2])
+        cov = cov + slanted[:, None, None] ** 2 * np.eye(2)
     expected = cov + H @ state.cov @ np.swapaxes(H, 1, 2)
     nis = np.einsum("mi,mi->m", residual, np.linalg.solve(expected, residual[..., None])[..., 0])
     good = nis <= settings.gate
@@ -258,13 +220,9 @@ def _flow_information(
 
 def _forget_depth(state: FlowFilterState, settings: FlowFilterSettings) -> FlowFilterState:
     """Keep the motion and the mean, but take the distance to be as uncertain as at first."""
-    first = 8 if state.kind == "hard" else 12
-    d = state.mean[-1]
-    cov = state.cov.copy()
+    first, cov = 2 * state.model.motion, state.cov.copy()
     cov[first:, :] = cov[:, first:] = 0.0
-    stds = np.full(state.mean.size - first, settings.slant_std * d)
-    stds[-1] = settings.initial_relative_std * d
-    cov[first:, first:] = np.diag(stds**2)
+    cov[first:, first:] = np.diag(_depth_stds(state.mean[-1], state.model, settings) ** 2)
     return replace(state, cov=cov, suspicious=0)
 
 
@@ -275,11 +233,9 @@ def distance_of(state: FlowFilterState, centroid: FloatArray | None = None) -> t
         state: the estimate.
         centroid: normalised image coordinates, shape (2,); None for the image centre. The hard filter ignores it.
     """
-    if state.kind == "hard":
-        d, variance = float(state.mean[8]), float(state.cov[8, 8])
-    else:
-        ray = np.array([*(np.zeros(2) if centroid is None else centroid), 1.0])
-        d, variance = float(ray @ state.mean[12:]), float(ray @ state.cov[12:, 12:] @ ray)
+    at = np.zeros((1, 2)) if centroid is None else np.reshape(centroid, (1, 2))
+    depths, by_state = state.model.inverse_depths(state.mean, at)
+    d, variance = float(depths[0]), float(by_state[0] @ state.cov @ by_state[0])
     d = min(max(d, MIN_INVERSE_DEPTH), MAX_INVERSE_DEPTH)
     return 1.0 / d, float(np.sqrt(variance)) / d**2
 
