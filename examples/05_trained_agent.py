@@ -6,14 +6,16 @@ import gymnasium as gym
 
 import fixation_gym  # noqa: F401
 from fixation_policies import agents
-from fixation_policies.catalogue import make_policy, surroundings
+from fixation_policies.catalogue import make_policy, needed_environment
 
 AGENT = Path(agents.__file__).parent / "zfc.zip"
 
 
 def main(agent: Path = AGENT, scenario: str = "clear", seed: int = 1) -> bool:
     """Run one episode; returns whether the object was lifted."""
-    place = surroundings(str(agent))  # the environment, observation and image size that the agent was trained with
+    place = needed_environment(
+        str(agent)
+    )  # the environment, observation and image size that the agent was trained with
     env = gym.make(place.env_id, scenario=scenario, image_size=place.image_size, **place.arguments)
     policy = make_policy(str(agent), env)
     obs, info = env.reset(seed=seed)

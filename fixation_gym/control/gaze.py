@@ -15,6 +15,10 @@ from fixation_gym.control import servo_laws
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 
+CENTRED = 0.06
+"""Largest offset of the target from the image centre that counts as fixated, normalised coordinates. While the gaze
+still swings to it, small errors of the time stamps look like motion."""
+
 
 @dataclass(frozen=True)
 class GazeGains:

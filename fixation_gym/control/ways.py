@@ -18,6 +18,10 @@ from fixation_gym.control.reach import REACH_GRID, directions
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
+WAY_MARGIN = 0.012
+"""How far off remembered points may be, m: ways are compared by hands that are smaller and larger by this."""
+BARRING_EVIDENCE = 60.0
+"""Evidence in a corridor (points times frames) from which on it is surely barred."""
 _RADII = (0.08, 0.13, 0.18, 0.23, 0.28, 0.33)
 """Distances from the target of the places that are looked at, m."""
 _ASIDE = 0.03

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fixation_gym.control.ways import SeenSpace, Ways, known_ways
+from fixation_gym.control.ways import BARRING_EVIDENCE, WAY_MARGIN, SeenSpace, Ways, known_ways
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow.evidence_map import CELLS
 from fixation_gym.surroundings import Surroundings
@@ -15,12 +15,8 @@ from fixation_gym.types import FloatArray
 
 _WIDEST = np.radians(75.0)
 """Angle between the present line of sight and the ways at the middle of the view's borders, rad."""
-_MARGIN = 0.012
-"""How far off remembered points may be, m."""
-_SURE = 60.0
-"""Evidence in a corridor (points times frames) with which it is surely barred: half of the scale, ..."""
-_FULL = 180.0
-"""... which grows with its logarithm and ends here."""
+_FULL = 3.0 * BARRING_EVIDENCE
+"""Evidence at the end of the scale, which grows with its logarithm; the middle is where a way is surely barred."""
 _BEYOND = np.cos(np.radians(9.0))
 """Cosine of the angle to the nearest way of the reach from which on the arm does not get there."""
 
@@ -30,7 +26,7 @@ def way_view(percept: Percept, T_base_cam: FloatArray, surroundings: Surrounding
     target, seen = percept.fixation.point_base, surroundings.seen
     if seen is None:
         seen = SeenSpace.empty(0.0)
-    return ways_in_view(known_ways(*surroundings.obstacles(target), target, seen, _MARGIN), T_base_cam, target)
+    return ways_in_view(known_ways(*surroundings.obstacles(target), target, seen, WAY_MARGIN), T_base_cam, target)
 
 
 def ways_in_view(ways: Ways, T_base_cam: FloatArray, target: FloatArray) -> NDArray[np.float32]:
@@ -48,7 +44,7 @@ def ways_in_view(ways: Ways, T_base_cam: FloatArray, target: FloatArray) -> NDAr
     """
     likeness = _directions(T_base_cam, target) @ ways.directions.T
     nearest = likeness.argmax(axis=-1)
-    sure = np.clip(np.log1p(ways.evidence / _SURE) / math.log1p(_FULL / _SURE), 0.0, 1.0)
+    sure = np.clip(np.log1p(ways.evidence / BARRING_EVIDENCE) / math.log1p(_FULL / BARRING_EVIDENCE), 0.0, 1.0)
     barred = np.where(likeness.max(axis=-1) > _BEYOND, sure[nearest], 1.0)
     return np.stack([barred, ways.unseen[nearest]]).astype(np.float32)
 

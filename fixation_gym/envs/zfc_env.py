@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium import spaces
 
+from fixation_gym.control.gaze import CENTRED
 from fixation_gym.control.open_loop import OpenLoopGains
 from fixation_gym.envs.arguments import checked_action, require_choice
 from fixation_gym.envs.config import CONTROL_FREQUENCY, IMAGE_SIZE
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
     from fixation_gym.envs.privileged_map import ObstacleDepth
 
 _GAINS = FixatorGains(open_loop=OpenLoopGains(hold_seconds=3.0))
-_CENTRED = 0.06
-"""While the gaze still swings to the target, small errors of the time stamps look like motion: what is then seen is
-not remembered. Offset of the target from the image centre, normalised coordinates."""
 
 
 class FixationPickZFC(FixationPickEnv):
@@ -184,7 +182,7 @@ class FixationPickZFC(FixationPickEnv):
     def _ways(self, percept: Percept) -> np.ndarray:
         """Remembers what is seen now, and says what is known of the ways."""
         fixation, fixator = percept.fixation, self._fixator
-        if fixation.visible and fixator.stage is None and np.linalg.norm(fixation.centroid) < _CENTRED:
+        if fixation.visible and fixator.stage is None and np.linalg.norm(fixation.centroid) < CENTRED:
             self._surroundings.look(percept, fixator.perception.support_height_m)
         return way_view(percept, fixator.T_base_cam, self._surroundings)
 

@@ -16,7 +16,7 @@ from fixation_gym.names import Names
 if TYPE_CHECKING:
     from fixation_gym.evaluation.rollout import EpisodeKey
     from fixation_gym.evaluation.workers import Cell
-    from fixation_policies.catalogue import Surroundings
+    from fixation_policies.catalogue import NeededEnvironment
 
 SEED_BLOCK = 100_000
 """Episode i of ``--seed S`` has seed S * SEED_BLOCK + i, in every scenario: policies meet the same scenes."""
@@ -70,30 +70,30 @@ class EvaluationConfig:
         if not 1 <= self.episodes <= SEED_BLOCK:
             raise UsageError(f"--episodes must be within 1..{SEED_BLOCK}, got {self.episodes}")
         check_seed(self.seed)
-        size = self.surroundings.image_size
+        size = self.needed_environment.image_size
         if not all(_IMAGE_SIZES[0] <= length <= _IMAGE_SIZES[1] for length in size):
             raise UsageError(f"--image-size must be within {_IMAGE_SIZES[0]}..{_IMAGE_SIZES[1]}, got {size}")
         check_backend(self.backend, self.workers)
 
     @property
-    def surroundings(self) -> Surroundings:
-        """Where the policy acts, with the image size that is asked for."""
-        from fixation_policies.catalogue import surroundings
+    def needed_environment(self) -> NeededEnvironment:
+        """What the policy acts in, with the image size that is asked for."""
+        from fixation_policies.catalogue import needed_environment
 
-        own = surroundings(self.policy)
+        own = needed_environment(self.policy)
         return own if self.image_size is None else replace(own, image_size=self.image_size)
 
     def run_description(self) -> dict[str, Any]:
         """Everything the result of one episode depends on, apart from its scenario and seed."""
         from fixation_policies.catalogue import source_hashes
 
-        surroundings = self.surroundings
+        needed = self.needed_environment
         return {
             "policy": self.policy,
             "seed": self.seed,
             "sensor_noise": self.sensor_noise,
-            "image_size": list(surroundings.image_size),
-            "env_id": surroundings.env_id,
+            "image_size": list(needed.image_size),
+            "env_id": needed.env_id,
             **({} if self.detector is None else {"detector": self.detector}),
             **self._renderer_description(),
             **source_hashes(self.policy, self.detector),
@@ -116,15 +116,15 @@ class EvaluationConfig:
     def cell(self, key: EpisodeKey) -> Cell:
         """The episode with this key, as ``workers.run_cell`` takes it."""
         scenario, seed = key
-        surroundings = self.surroundings
+        needed = self.needed_environment
         return {
-            "env_id": surroundings.env_id,
+            "env_id": needed.env_id,
             "scenario": scenario,
             "policy": self.policy,
             "detector": self.detector,
             "seed": seed,
             "sensor_noise": self.sensor_noise,
-            "image_size": list(surroundings.image_size),
+            "image_size": list(needed.image_size),
             "renderer": self.renderer,
         }
 

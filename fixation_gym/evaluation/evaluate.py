@@ -71,7 +71,7 @@ def summary_of(config: EvaluationConfig, results: Sequence[EpisodeResult], wall_
         "seed_sha256": seed_hash(config.episode_keys()),
         "seed": config.seed,
         "sensor_noise": config.sensor_noise,
-        "image_size": list(config.surroundings.image_size),
+        "image_size": list(config.needed_environment.image_size),
         "versions": installed_versions(),
         "commit": source_commit(),
         "gl": os.environ.get("MUJOCO_GL"),

@@ -71,7 +71,7 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
         MissingGLError: if nothing can render here.
     """
     prepare_process()  # before the environment's module imports robosuite
-    from fixation_policies.catalogue import surroundings
+    from fixation_policies.catalogue import needed_environment
 
     return gymnasium.make(
         cell["env_id"],
@@ -81,7 +81,7 @@ def make_env(cell: Cell, render_mode: str | None = None, render_view: str = "ove
         render_mode=render_mode,
         render_view=render_view,
         renderer=cell["renderer"],
-        **surroundings(cell["policy"]).arguments,
+        **needed_environment(cell["policy"]).arguments,
     )
 
 

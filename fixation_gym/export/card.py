@@ -27,7 +27,7 @@ def dataset_card(config: ExportConfig, episodes: Sequence[Recorded], summary: Ma
     Returns:
         Markdown after a header of metadata.
     """
-    height, width = config.surroundings.image_size
+    height, width = config.needed_environment.image_size
     count = len(episodes)
     versions = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
     columns = "\n".join(f"| `{name}` | {', '.join(parts)} |" for name, parts in NAMES.items())
@@ -72,7 +72,7 @@ map is the probability that something there is nearer than the target, times 255
 
 
 def _command(config: ExportConfig) -> str:
-    height, width = config.surroundings.image_size
+    height, width = config.needed_environment.image_size
     words = ["fixation-gym", "export", "--policy", config.policy, "--scenario", ",".join(config.scenarios)]
     words += ["--episodes", str(config.episodes), "--seed", str(config.seed), "--format", config.format]
     words += ["--sensor-noise", config.sensor_noise, "--image-size", str(height), str(width)]

@@ -37,7 +37,7 @@ def write_dataset(folder: Path, episodes: Sequence[Recorded], config: ExportConf
     fps = CONTROL_FREQUENCY
     recorded = [_features_of(folder, episode.index) for episode in episodes]
     columns = {name: np.concatenate([part[name] for part in recorded]) for name in recorded[0] if ":" not in name}
-    features = _features(columns, fps, config.surroundings.image_size)
+    features = _features(columns, fps, config.needed_environment.image_size)
     stats = {name: _statistics(values) for name, values in columns.items() if name not in FLAGS}
     for video in VIDEOS:
         stats[video] = _picture_statistics(np.array([part[f"sums:{video}"] for part in recorded]))

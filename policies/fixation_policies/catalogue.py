@@ -35,8 +35,8 @@ _POLICY_METHODS = ("reset", "act")
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """Where a policy acts."""
+class NeededEnvironment:
+    """The environment that a policy acts in."""
 
     env_id: str = "fixation_gym:FixationPick-v0"
     arguments: dict[str, Any] = field(default_factory=dict)
@@ -87,29 +87,29 @@ def source_hashes(policy: str, detector: str | None) -> dict[str, str]:
     return hashes
 
 
-def surroundings(name: str) -> Surroundings:
-    """Where the policy of that name, or the agent in that file, acts.
+def needed_environment(name: str) -> NeededEnvironment:
+    """What the policy of that name, or the agent in that file, acts in.
 
     Raises:
         UsageError: for a file that is no agent.
     """
     if name in VARIANT_NAMES:
-        return Surroundings(arguments={"depth_camera": True} if servo_variant(name).depth_camera else {})
+        return NeededEnvironment(arguments={"depth_camera": True} if servo_variant(name).depth_camera else {})
     if not name.endswith(AGENT_SUFFIX):
-        return Surroundings()
+        return NeededEnvironment()
     card = read_card(Path(name))
     learner = CONFIGS[card.config]
     if learner.residual:
-        return Surroundings(image_size=card.image_size)
+        return NeededEnvironment(image_size=card.image_size)
     arguments = {"observation": learner.observation}
-    return Surroundings("fixation_gym:FixationPickZFC-v0", arguments, card.image_size)
+    return NeededEnvironment("fixation_gym:FixationPickZFC-v0", arguments, card.image_size)
 
 
 def make_policy(name: str, env: Any, detector: str | None = None) -> Policy:
     """Build a policy for an environment made by ``gym.make("FixationPick-v0")``.
 
     Args:
-        name: one of ``POLICY_NAMES``, the path of an agent for an environment as its ``surroundings``, or
+        name: one of ``POLICY_NAMES``, the path of an agent for an environment as its ``needed_environment``, or
             ``module:Class``; such a class is called with the unwrapped environment.
         env: the environment; only "oracle" looks into it during an episode.
         detector: one of ``DETECTORS`` or ``module:Class``, called with the camera's ``Intrinsics``. None: by colour, or

@@ -153,10 +153,10 @@ def test_bad_values_are_refused():
 
 @pytest.mark.sim
 def test_policy_sees_the_depth_of_its_environment():
-    from fixation_policies.catalogue import make_policy, surroundings
+    from fixation_policies.catalogue import make_policy, needed_environment
 
     name = "servo:depth"
-    env = gym.make("FixationPick-v0", scenario="opaque", image_size=(120, 160), **surroundings(name).arguments)
+    env = gym.make("FixationPick-v0", scenario="opaque", image_size=(120, 160), **needed_environment(name).arguments)
     policy, observation = make_policy(name, env), env.reset(seed=1)[0]
     policy.reset()
     for _ in range(25):

@@ -13,7 +13,7 @@ from fixation_gym.envs.config import SCENARIOS
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.robots import ROBOT
-from fixation_policies.catalogue import POLICY_NAMES, make_policy, surroundings
+from fixation_policies.catalogue import POLICY_NAMES, make_policy, needed_environment
 from fixation_policies.servo.servo_policy import ServoPolicy
 from fixation_policies.servo.variants import VARIANT_NAMES, VARIANTS, servo_variant
 
@@ -49,8 +49,8 @@ def test_without_poses_the_fixation_constraint_leads_the_hand_to_the_target() ->
 
 
 def test_only_the_variant_that_asks_a_depth_camera_is_given_one() -> None:
-    assert [name for name in POLICY_NAMES if surroundings(name).arguments] == ["servo:depth"]
-    assert surroundings("servo:depth").arguments == {"depth_camera": True}
+    assert [name for name in POLICY_NAMES if needed_environment(name).arguments] == ["servo:depth"]
+    assert needed_environment("servo:depth").arguments == {"depth_camera": True}
 
 
 RULES = ("servo:dot_product", "servo:depth", "servo:motion_stereo", "servo:plane_parallax")

@@ -13,7 +13,7 @@ import pytest
 from fixation_gym.cli import main
 from fixation_gym.errors import UsageError
 from fixation_policies import agents
-from fixation_policies.catalogue import check_policy, surroundings
+from fixation_policies.catalogue import check_policy, needed_environment
 from fixation_policies.rl.agent_file import AgentCard, read_agent, read_card, write_agent
 from fixation_policies.rl.config import CONFIGS
 from fixation_policies.rl.network import weight_shapes
@@ -47,11 +47,11 @@ def test_what_is_written_is_read(agent):
 
 
 def test_an_agent_acts_where_it_was_trained(agent):
-    place = surroundings(str(agent))
+    place = needed_environment(str(agent))
     assert place.env_id.endswith("FixationPickZFC-v0")
     assert place.arguments == {"observation": "zfc"}
     assert place.image_size == (96, 128)
-    assert surroundings("servo").env_id.endswith("FixationPick-v0")
+    assert needed_environment("servo").env_id.endswith("FixationPick-v0")
 
 
 def damage_nothing_there(path):

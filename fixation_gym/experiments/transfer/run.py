@@ -53,9 +53,9 @@ def _world(policy: str, digest: str, scenario: str, axis: str, severity: str) ->
     workers.prepare_process()
     import gymnasium
 
-    from fixation_policies.catalogue import surroundings
+    from fixation_policies.catalogue import needed_environment
 
-    place = surroundings(policy)
+    place = needed_environment(policy)
     chosen = Shift(NONE, NONE) if axis == NONE else shift(axis, severity)
     # The oracle knows where everything is, so no image is rendered for it.
     size = None if policy == "oracle" else place.image_size

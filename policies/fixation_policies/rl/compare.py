@@ -17,7 +17,7 @@ from fixation_gym.evaluation.files import write_csv, write_json
 from fixation_gym.evaluation.missing_cells import run_missing
 from fixation_gym.evaluation.source import source_commit
 from fixation_gym.evaluation.storage import RUN_FILE, SUMMARY_FILE, ResultStore
-from fixation_policies.catalogue import surroundings
+from fixation_policies.catalogue import needed_environment
 from fixation_policies.rl.comparison_tables import (
     CURVES_FILE,
     DIFFERENCES_FILE,
@@ -113,7 +113,7 @@ def run_cell(cell: workers.Cell) -> dict[str, Any]:
     """
     folder = Path(cell["folder"])
     trained: dict[str, Any] = {"curve": [], "wall_s": 0.0, "seconds": {}}
-    policy, image_size = SERVO, surroundings(SERVO).image_size
+    policy, image_size = SERVO, needed_environment(SERVO).image_size
     if cell["config"] != SERVO:
         trained = train_cell(cell)
         policy, image_size = trained["agent"], tuple(cell["training"]["image_size"])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from fixation_gym.control.gaze import GazeGains
+from fixation_gym.control.gaze import CENTRED, GazeGains
 from fixation_gym.control.open_loop import OpenLoopGains
-from fixation_gym.control.ways import WayCosts
+from fixation_gym.control.ways import BARRING_EVIDENCE, WAY_MARGIN, WayCosts
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class ServoGains:
     """Of ways."""
     obstacle_margin: float = 0.002
     """Room to keep between hand and obstacles, m."""
-    way_margin: float = 0.012
+    way_margin: float = WAY_MARGIN
     """How far off remembered points may be, m: ways are compared by hands that are smaller and larger by this."""
-    obstacle_evidence: float = 60.0
+    obstacle_evidence: float = BARRING_EVIDENCE
     """Evidence in the corridor (points times frames) that stops the approach; less slows it down."""
     retreat_gap: float = 0.08
     """An obstacle nearer than this before the finger tips makes the hand retreat, m."""
@@ -70,7 +70,7 @@ class ServoGains:
     """The grasp starts below this multiple of ``desired_distance``."""
     grasp_relative_std: float = 0.03
     """Relative distance error needed for the grasp."""
-    grasp_centred: float = 0.06
+    grasp_centred: float = CENTRED
     """Largest offset of the target from the image centre for the grasp, normalised coordinates."""
     grasp_excess_roll: float = 0.02
     """By how much more than low fingers allow the hand may be turned at the grasp, rad: circling turns it to and fro by
