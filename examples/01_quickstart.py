@@ -14,7 +14,7 @@ def main() -> None:
         if terminated or truncated:
             obs, info = env.reset()
     print("image", obs["rgb"].shape, " camera at", obs["camera_pose"][:3].round(3), "m")
-    print("true distance", round(info["distance_true_m"], 3), "m  reward terms", info["reward_terms"])
+    print("true distance", round(info["distance_true_m"], 3), "m  for progress", round(info["reward_progress"], 3))
     env.close()
 
 

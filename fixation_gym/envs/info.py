@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from fixation_gym.envs.rewards import TaskState
+from fixation_gym.envs.rewards import TERMS, TaskState
 
 
-def info_of(state: TaskState, clearance: float, sight: tuple[float, float], terms: dict[str, float]) -> dict[str, Any]:
+def info_of(
+    state: TaskState, clearance: float, sight: tuple[float, float], terms: Mapping[str, float]
+) -> dict[str, Any]:
     """The info of a step; its keys are those of the class's page.
 
     Args:
@@ -18,7 +21,7 @@ def info_of(state: TaskState, clearance: float, sight: tuple[float, float], term
         sight: depth of the target's centre, m, and its offset from the image centre, px.
         terms: of the reward.
     """
-    # NumPy's scalars: some libraries ask every value for its dtype.
+    # NumPy's scalars and nothing nested: some libraries ask every value for its dtype.
     return {
         "is_success": np.bool_(state.success),
         "success": np.bool_(state.success),
@@ -26,5 +29,15 @@ def info_of(state: TaskState, clearance: float, sight: tuple[float, float], term
         "clearance_m": np.float64(clearance),
         "distance_true_m": np.float64(sight[0]),
         "fixation_error_px": np.float64(sight[1]),
-        "reward_terms": terms,
+        **with_prefix(terms),
     }
+
+
+def with_prefix(terms: Mapping[str, float]) -> dict[str, np.float64]:
+    """Terms of the reward as an info has them: ``reward_progress`` and so on, as in Gymnasium's own environments."""
+    return {f"reward_{term}": np.float64(value) for term, value in terms.items()}
+
+
+def reward_terms(info: Mapping[str, Any]) -> dict[str, float]:
+    """The terms of the reward in an info, by their names in ``TERMS``."""
+    return {term: float(info[f"reward_{term}"]) for term in TERMS}

@@ -62,8 +62,8 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     | ``target_box`` | (4,) | which thing is the target: x, y, width, height in px of the first image, 0 out of it |
 
     **Reward** ``"dense"``: potential-based progress, -0.004 per step, +10 on success, -5 for the first collision,
-    unless ``reward_weights`` say otherwise; ``"sparse"``: +1 on success, -1 for the first collision. The terms,
-    ``progress``, ``time``, ``success`` and ``collision``, are in ``info["reward_terms"]`` and sum to the reward.
+    unless ``reward_weights`` say otherwise; ``"sparse"``: +1 on success, -1 for the first collision. It is the sum of
+    ``reward_progress``, ``reward_time``, ``reward_success`` and ``reward_collision`` in ``info``.
 
     **Start** Red object of random shape, size and pose on the table, obstacles by scenario, camera 0.42-0.49 m away,
     looking within 9 cm of it; of two red objects the target is the one nearer to the first image's centre.
@@ -73,8 +73,8 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
     **Info** the same keys in ``reset`` and ``step``: ``is_success``, ``success``, ``collision`` (robot-obstacle contact
     above 1 N, or an obstacle pushed off its place or way by more than 1 cm, so far in the episode), ``clearance_m``
     (between robot and obstacles, at most 0.5), ``distance_true_m`` (depth of the target's centre along the optical
-    axis), ``fixation_error_px`` (of that centre from the image centre; NaN behind the camera), ``reward_terms``. True
-    values never reach the observation.
+    axis), ``fixation_error_px`` (of that centre from the image centre; NaN behind the camera), and the reward's terms.
+    True values never reach the observation.
     """
 
     metadata = {"render_modes": ["rgb_array", "human"], "render_fps": config.CONTROL_FREQUENCY}  # noqa: RUF012
@@ -168,8 +168,7 @@ class FixationPickEnv(Resumable, gym.Env[dict[str, Any], np.ndarray]):
         observation = self._observe()
         if self.render_mode == "human":
             self.render()
-        terms = dict.fromkeys(self._reward_terms(self._state, self._state), 0.0)
-        return observation, self._info(terms)
+        return observation, self._info(dict.fromkeys(rewards.TERMS, 0.0))
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Run one control period.

@@ -14,6 +14,8 @@ from fixation_gym.envs.config import LIFT_HEIGHT
 from fixation_gym.envs.field_checks import with_fields
 
 REWARDS = ("dense", "sparse")
+TERMS: tuple[str, ...] = ("progress", "time", "success", "collision")
+"""Names of the terms, the same with every reward."""
 
 
 @dataclass(frozen=True)

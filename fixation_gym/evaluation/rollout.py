@@ -11,7 +11,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from fixation_gym.envs.info import reward_terms
 from fixation_gym.envs.pick_env import FixationPickEnv
+from fixation_gym.envs.rewards import TERMS
 from fixation_gym.evaluation.scene_truth import scene_of
 from fixation_gym.evaluation.statistics import mean, minimum, root_mean_square
 from fixation_gym.evaluation.trace import Trace, TraceRecorder
@@ -125,7 +127,7 @@ def run_episode(
     recorder = TraceRecorder(scene_of(env))
     steps: list[Step] = []
     total = 0.0
-    reward_terms: dict[str, float] = {}
+    terms = dict.fromkeys(TERMS, 0.0)
     terminated = truncated = False
     while not (terminated or truncated):
         action = decision(policy, obs)
@@ -137,14 +139,11 @@ def run_episode(
             on_frame(_render(env))
         obs, reward, terminated, truncated, info = env.step(action)
         total += float(reward)
-        for term, value in info["reward_terms"].items():
-            reward_terms[term] = reward_terms.get(term, 0.0) + float(value)
+        terms = {term: terms[term] + value for term, value in reward_terms(info).items()}
     if on_frame is not None:
         on_frame(_render(env))
     recorder.add_end(_sensed(env, obs), info)
-    return _result(
-        (scenario, policy_name, seed), steps, recorder.trace(), bool(info["is_success"]), total, reward_terms
-    )
+    return _result((scenario, policy_name, seed), steps, recorder.trace(), bool(info["is_success"]), total, terms)
 
 
 def _result(
@@ -153,7 +152,7 @@ def _result(
     trace: Trace,
     success: bool,
     total: float,
-    reward_terms: dict[str, float],
+    terms: dict[str, float],
 ) -> EpisodeResult:
     """Measurements of an episode with these decisions; ``names`` are scenario, policy and seed."""
     scenario, policy, seed = names
@@ -169,7 +168,7 @@ def _result(
         time_s=float(trace.time_s[-1]),
         steps=len(steps),
         return_=total,
-        reward_terms=reward_terms,
+        reward_terms=terms,
         final_phase=steps[-1].phase,
         distance_error_at_grasp_m=error_at_grasp(steps),
         distance_mae_m=mean(step.distance_error_m for step in gazing),

@@ -59,7 +59,12 @@ CLIENTS = (
     Client("sb3-contrib", "sb3-contrib", ("sb3-contrib",), "`TQC`, `RecurrentPPO`"),
     Client("sbx", "sbx-rl", ("sbx-rl",), "`SAC`, `PPO` after `FlattenObservation`: its policies take one vector"),
     Client("rl-zoo3", "rl-zoo3", ("rl-zoo3",), "`train`, `enjoy`, `record_video`"),
-    Client("TorchRL", "torchrl", ("torchrl",), "`check_env_specs`, `rollout`, `Collector`, `ReplayBuffer`"),
+    Client(
+        "TorchRL",
+        "torchrl",
+        ("torchrl",),
+        "`auto_register_info_dict`, `check_env_specs`, `rollout`, `Collector`, `ReplayBuffer`",
+    ),
     Client("Tianshou", "tianshou", ("tianshou",), "`PPO` after `FlattenObservation`, both vector environments"),
     Client("RLlib", "ray", ("ray[rllib]",), "`PPO` with its connector `FlattenObservations`"),
     Client("d3rlpy", "d3rlpy", ("d3rlpy",), "`CQL` off line, `SAC` on line, after `FlattenObservation`"),

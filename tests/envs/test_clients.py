@@ -217,7 +217,7 @@ def test_scenes_do_not_depend_on_how_long_the_episodes_before_were():
 def test_values_in_info_have_a_dtype_as_torchrl_asks():
     env = FixationPickEnv(image_size=SMALL)
     _, info = env.reset(seed=0)
-    dtypes = {key: value.dtype for key, value in info.items() if key != "reward_terms"}
+    dtypes = {key: value.dtype for key, value in info.items()}
     assert {key for key, dtype in dtypes.items() if dtype.kind == "b"} == {"is_success", "success", "collision"}
     env.close()
 

@@ -11,6 +11,7 @@ import pytest
 
 import fixation_gym
 from fixation_gym.envs import config
+from fixation_gym.envs.info import reward_terms, with_prefix
 from fixation_gym.envs.pick_env import FixationPickEnv
 from fixation_gym.envs.rewards import RewardWeights
 from fixation_gym.envs.sensor_noise import SENSOR_NOISE, SensorNoise
@@ -149,4 +150,4 @@ def test_the_tables_of_info_and_reward_terms():
     env.close()
     told = [key for row in rows(section(IDS[0], "Info")) for key in re.findall(r"`(\w+)`", row[0])]
     assert told == list(info)
-    assert [name_in(row[0]) for row in rows(section(IDS[0], "Rewards"))] == list(info["reward_terms"])
+    assert [name_in(row[0]) for row in rows(section(IDS[0], "Rewards"))] == list(with_prefix(reward_terms(info)))

@@ -88,7 +88,7 @@ def test_pushing_an_obstacle_counts_as_a_collision(env):
     sim.data.joint(f"{body}_joint").qpos[0] += 0.05
     _, reward, _, _, info = env.step(np.zeros(7, np.float32))
     assert info["collision"]
-    assert info["reward_terms"]["collision"] < 0.0
+    assert info["reward_collision"] < 0.0
     assert reward < -4.0
 
 

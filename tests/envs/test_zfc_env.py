@@ -11,6 +11,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 import fixation_gym  # noqa: F401
+from fixation_gym.envs.info import reward_terms
 from fixation_gym.envs.views import Views
 from fixation_gym.envs.zfc_env import FixationPickZFC
 from fixation_gym.envs.zfc_observation import OBSERVATIONS
@@ -172,7 +173,7 @@ def test_the_gaze_is_held_while_the_agent_moves_as_it_likes(opaque):
         velocity = 0.6 * np.array([math.sin(0.15 * step), math.cos(0.1 * step), 0.2])
         obs, reward, _, _, info = env.step(np.array([*velocity, -1], np.float32))
         errors.append(info["fixation_error_px"])
-        assert sum(info["reward_terms"].values()) == pytest.approx(reward)
+        assert sum(reward_terms(info).values()) == pytest.approx(reward)
     assert max(errors[25:]) < 0.06 * env.intrinsics.fx
     np.testing.assert_allclose(obs["proprio"][13:16], 0.15 * velocity, atol=0.01)
 

@@ -55,7 +55,10 @@ class FakeEnv(gymnasium.Env):
             "clearance_m": 0.5 - 0.1 * self.count,
             "distance_true_m": 1.0 - 0.1 * self.count,
             "fixation_error_px": 3.0 if self.count % 2 else 4.0,
-            "reward_terms": {"reach": 0.75, "lift": 0.25},
+            "reward_progress": 0.75,
+            "reward_time": 0.0,
+            "reward_success": 0.25,
+            "reward_collision": 0.0,
         }
 
 

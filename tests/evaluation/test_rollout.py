@@ -17,7 +17,7 @@ def test_an_episode_has_the_measurements_of_its_steps() -> None:
     assert (result.success, result.collision, result.collision_free_success) == (True, False, True)
     assert (result.steps, result.return_, result.final_phase) == (5, 5.0, "lift")
     assert result.time_s == pytest.approx(0.2)
-    assert result.reward_terms == pytest.approx({"reach": 3.75, "lift": 1.25})
+    assert result.reward_terms == {"progress": 3.75, "time": 0.0, "success": 1.25, "collision": 0.0}
     assert result.min_clearance_m == pytest.approx(0.0)
 
 

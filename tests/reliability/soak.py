@@ -18,6 +18,8 @@ import numpy as np
 import tyro
 
 from fixation_gym.envs.config import SCENARIO_NAMES
+from fixation_gym.envs.info import reward_terms
+from fixation_gym.envs.rewards import TERMS
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.source import source_commit
@@ -32,7 +34,8 @@ WARM_UP = 5
 LONGEST_HOLD = 20
 """An action is held for up to so many steps: others every step only tremble, and never get anywhere."""
 CSV_FILE = "soak.csv"
-FLAGS, LENGTHS = ("is_success", "success", "collision"), ("clearance_m", "distance_true_m", "fixation_error_px")
+FLAGS = ("is_success", "success", "collision")
+NUMBERS = ("clearance_m", "distance_true_m", "fixation_error_px", *(f"reward_{term}" for term in TERMS))
 
 
 @dataclass(frozen=True)
@@ -154,16 +157,14 @@ def faults_of(env: Any, observation: Mapping[str, Any], info: Mapping[str, Any],
         faults.add("keys of the observation are not those of its space")
     if not isinstance(reward, float) or not math.isfinite(reward):
         faults.add(f"reward is {reward!r}")
-    if not {*FLAGS, *LENGTHS, "reward_terms"} <= set(info):
+    if not {*FLAGS, *NUMBERS} <= set(info):
         return faults | {"info lacks keys"}
     faults |= {f"info {key} is {info[key]!r}" for key in FLAGS if not isinstance(info[key], np.bool_)}
-    for key in LENGTHS:
+    for key in NUMBERS:
         may_be_nan = key == "fixation_error_px" and info["distance_true_m"] <= 0.0
         if not isinstance(info[key], np.float64) or not (math.isfinite(info[key]) or may_be_nan):
             faults.add(f"info {key} is {info[key]!r}")
-    if not all(type(term) is float and math.isfinite(term) for term in info["reward_terms"].values()):
-        faults.add("a reward term is no finite number")
-    if not math.isclose(sum(info["reward_terms"].values()), reward, abs_tol=1e-9):
+    if not math.isclose(sum(reward_terms(info).values()), reward, abs_tol=1e-9):
         faults.add("reward terms do not sum to the reward")
     return faults
 

@@ -5,7 +5,11 @@ import os
 import gymnasium as gym
 import numpy as np
 
+from fixation_gym.envs.info import with_prefix
 from fixation_gym.envs.zfc_observation import zfc_observation_space
+
+TERMS = {"progress": 0.75, "time": 0.25, "success": 0.0, "collision": 0.0}
+"""Of every step's reward."""
 
 
 class FakeZFC(gym.Env):
@@ -46,4 +50,4 @@ class FakeZFC(gym.Env):
         return {"zfc_map": cells, "fixation": np.array([0, 0, 1, 0.4, 0.01], np.float32), "proprio": proprio}
 
     def _info(self):
-        return {"is_success": False, "collision": False, "reward_terms": {"time": 0.25, "progress": 0.75}}
+        return {"is_success": False, "collision": False, **with_prefix(TERMS)}

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from rl_fakes import FakeZFC
+from rl_fakes import TERMS, FakeZFC
 
+from fixation_gym.envs.info import reward_terms
 from fixation_policies.rl.agent import Decider
 from fixation_policies.rl.config import CONFIGS
 from fixation_policies.rl.decisions import PERIODS, DecisionEnv, FixedEpisodes, env_action
@@ -29,8 +30,8 @@ def test_an_action_is_held_and_rewards_are_summed(env, inner):
     assert len(inner.actions) == PERIODS == info["periods"]
     assert all(action[0] == np.float32(0.3) for action in inner.actions)
     assert reward == PERIODS
-    assert info["reward_terms"] == {"time": 0.25 * PERIODS, "progress": 0.75 * PERIODS}
-    assert sum(info["reward_terms"].values()) == reward
+    assert reward_terms(info) == {term: value * PERIODS for term, value in TERMS.items()}
+    assert sum(reward_terms(info).values()) == reward
     assert not terminated
     assert not truncated
     assert input_space(CONFIGS["zfc"]).contains(inputs)

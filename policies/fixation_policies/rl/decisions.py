@@ -9,6 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fixation_gym.envs.info import reward_terms, with_prefix
+from fixation_gym.envs.rewards import TERMS
 from fixation_policies.rl.config import Configuration
 from fixation_policies.rl.inputs import (
     PERIODS,
@@ -34,7 +36,7 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
     most of the time of a manoeuvre. So in training, and only there, a grasp does not follow a target that is pushed, or
     whose body is seen better on the way.
     The memory of the view rests meanwhile, here and in agents.
-    Rewards and ``info["reward_terms"]`` are summed; ``info["periods"]`` counts.
+    Rewards and their terms in ``info`` are summed; ``info["periods"]`` counts.
     """
 
     def __init__(self, env: gym.Env[Any, Any], learner: Configuration | None = None) -> None:
@@ -62,19 +64,19 @@ class DecisionEnv(gym.Wrapper[dict[str, Any], NDArray[np.float32], dict[str, Any
     def step(self, action: NDArray[np.float32]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Act until the next decision."""
         command = env_action(action)
-        total, terms, periods, grasping = 0.0, {}, 0, False
+        total, terms, periods, grasping = 0.0, dict.fromkeys(TERMS, 0.0), 0, False
         while True:
             obs, reward, terminated, truncated, info = self.env.step(command)
             if self._base.camera_on:
                 self._memory = remember(self._memory, obs, self._learner)
             total, periods = total + float(reward), periods + 1
-            terms = {name: terms.get(name, 0.0) + value for name, value in info["reward_terms"].items()}
+            terms = {name: terms[name] + value for name, value in reward_terms(info).items()}
             was_grasping, grasping = grasping, busy(obs)
             self._base.camera_on = not blind_stage(obs)
             decide = was_grasping or periods >= PERIODS
             if terminated or truncated or (decide and not grasping):
                 break
-        info = {**info, "reward_terms": terms, "periods": periods}
+        info = {**info, **with_prefix(terms), "periods": periods}
         return network_inputs(obs, self._memory, self._learner), total, terminated, truncated, info
 
 
