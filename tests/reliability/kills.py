@@ -13,6 +13,7 @@ import shutil
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,6 +93,8 @@ def start(name: str, folder: Path, log_file: Path | None = None) -> int:
     code = 1
     try:
         code = main(name, folder)
+    except Exception:
+        traceback.print_exc()  # the process ends below, before Python would
     finally:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -124,7 +124,7 @@ def transfer(out: Path) -> int:
 
 
 def demo(out: Path) -> int:
-    return cli.Demo(policy="blind", scenario=("clear",), out=out).run()
+    return cli.Demo(policy="blind", scenarios=("clear",), out=out).run()
 
 
 COMMANDS: dict[str, Callable[[Path], int]] = {
