@@ -23,6 +23,7 @@ from fixation_gym.envs.rewards import TERMS
 from fixation_gym.errors import UsageError, check_names
 from fixation_gym.evaluation.files import write_csv
 from fixation_gym.evaluation.source import source_commit
+from fixation_gym.evaluation.text_table import aligned
 from fixation_gym.evaluation.workers import kept, prepare_process
 from fixation_gym.experiments.runner import Cell, Experiment
 from fixation_gym.gl import MissingGLError, select_backend
@@ -78,6 +79,14 @@ class Args:
         ]
 
 
+def format_table(summary: Mapping[str, Any]) -> str:
+    """Rows and sums as plain text."""
+    rows = summary["rows"]
+    table = aligned([[*rows[0]], *([str(value) for value in row.values()] for row in rows)])
+    steps, episodes, faults = (sum(row[name] for row in rows) for name in ("steps", "episodes", "faults"))
+    return f"{table}\n\n{steps} steps, {episodes} episodes, {faults} faults"
+
+
 EXPERIMENT = Experiment(
     command="soak",
     unit="piece",
@@ -86,6 +95,7 @@ EXPERIMENT = Experiment(
     key=lambda cell: (cell["environment"], cell["scenario"], cell["index"]),
     content=frozenset({"environment", "scenario", "index", "steps", "faults", "rss_mb"}),
     note=lambda value: f"{value['scenario']}, {value['environment']}, {len(value['faults'])} faults",
+    table=format_table,
 )
 
 
@@ -211,13 +221,8 @@ def run(args: Args) -> int:
         rows = [row_of(*key, [p for p in pieces if (p["environment"], p["scenario"]) == key]) for key in keys]
         folder.write_summary({"rows": rows}, {"resumed": folder.resumed})
         write_csv(args.out / CSV_FILE, rows)
-    for row in rows:
-        print(" ".join(f"{name}={value}" for name, value in row.items()))
-    faults = sum(row["faults"] for row in rows)
-    print(
-        f"{sum(row['steps'] for row in rows)} steps, {sum(row['episodes'] for row in rows)} episodes, {faults} faults"
-    )
-    return 1 if faults else 0
+    EXPERIMENT.show({"rows": rows}, args.out)
+    return 1 if any(row["faults"] for row in rows) else 0
 
 
 if __name__ == "__main__":
