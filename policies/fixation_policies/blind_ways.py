@@ -12,7 +12,7 @@ from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
 from fixation_policies.base import SimulatedWorld
 from fixation_policies.grips import grips_of, rolls
-from fixation_policies.oracle import GRASP_DISTANCE, OraclePolicy
+from fixation_policies.privileged import GRASP_DISTANCE, PrivilegedPolicy
 
 Origin = Literal["base", "view", "target"]
 Style = Literal["straight", "curved", "stepped"]
@@ -85,7 +85,7 @@ class BlindWay:
         return 0.0 if self.style == "stepped" and _stops(seconds) else self.speed
 
 
-class BlindWayPolicy(OraclePolicy):
+class BlindWayPolicy(PrivilegedPolicy):
     """Goes a blind way with the oracle's motions, also its second tries; no obstacle changes what it does.
 
     It knows the target's true pose at every time, which is more than any blind policy can know: its success is an upper
@@ -106,7 +106,7 @@ class BlindWayPolicy(OraclePolicy):
         self._azimuth = 0.0
 
     def choose(self, pose: FloatArray, target: FloatArray, time: float) -> tuple[FloatArray, int]:
-        """The way's direction and the grip for which the hand turns least; see ``OraclePolicy.choose``."""
+        """The way's direction and the grip for which the hand turns least; see ``PrivilegedPolicy.choose``."""
         if self._first_view is None:
             self._first_view = math.atan2(target[1] - pose[1, 3], target[0] - pose[0, 3])
         azimuths = self._way.azimuths(math.atan2(target[1], target[0]), self._first_view)
@@ -120,7 +120,7 @@ class BlindWayPolicy(OraclePolicy):
         return directions[best], int(grips[best])
 
     def come_in(self, depth: float, seconds: float) -> tuple[FloatArray, float]:
-        """Direction from which to look, and speed; see ``OraclePolicy.come_in``."""
+        """Direction from which to look, and speed; see ``PrivilegedPolicy.come_in``."""
         return _direction(self._azimuth, self._way.elevation(depth, seconds)), self._way.speed_at(seconds)
 
 

@@ -44,6 +44,23 @@ def slants(directions: FloatArray, grips: IntArray, rotation: FloatArray) -> Flo
     return np.where(grips < 0, 0.0, np.arcsin(np.minimum(along, 1.0)))
 
 
+def widths(directions: FloatArray, grips: IntArray, rotation: FloatArray, half: FloatArray) -> FloatArray:
+    """How wide the box around a target is along the line on which the fingers close, shape (n,), m; as ``rolls``.
+
+    What is round, or thinner where it is not held, is as wide as it is along its grip.
+
+    Args:
+        directions: unit vectors from target to camera, shape (n, 3).
+        grips: axes of the target as in ``grips_of``, shape (n,).
+        rotation: of the target, shape (3, 3).
+        half: half sizes of the box, shape (3,), m.
+    """
+    axes = rotation.T[np.maximum(grips, 0)]
+    closing = axes - np.einsum("ni,ni->n", directions, axes)[:, None] * directions
+    closing /= np.linalg.norm(closing, axis=1, keepdims=True)
+    return np.where(grips < 0, 2.0 * half[1], 2.0 * np.abs(closing @ rotation) @ half)
+
+
 def half_turn(angle: Any) -> Any:
     """Angle or angles, rad, taken to [-pi/2, pi/2): a grip turned by half a turn is the same."""
     return (angle + math.pi / 2) % math.pi - math.pi / 2

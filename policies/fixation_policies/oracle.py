@@ -3,158 +3,87 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from itertools import product
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fixation_gym.control import gaze, open_loop, servo_laws
 from fixation_gym.control.corridor import approach_directions, free_directions
 from fixation_gym.control.reach import reachable_directions
-from fixation_gym.envs.object_pool import target_shape
+from fixation_gym.envs import config
 from fixation_gym.envs.scene import SceneSpec
 from fixation_gym.geometry.boxes import BoxSet, box_set, joined
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray
-from fixation_policies.base import Action, Estimate, SimulatedWorld
-from fixation_policies.grips import LARGEST_SLANT, grips_of, half_turn, rolls, slants
+from fixation_policies.base import SimulatedWorld
+from fixation_policies.grips import LARGEST_SLANT, grips_of, rolls, slants, widths
+from fixation_policies.privileged import VIEW_DISTANCE, Choice, PrivilegedPolicy
 
-VIEW_DISTANCE, GRASP_DISTANCE = 0.42, 0.18
-"""Distance of the camera from the target on the way around it, and at the end of the approach, m."""
-_RETREAT_DISTANCE = 0.30
-_SPEED = 0.10
-"""Of the approach, m/s."""
-_HELD = 0.045
-"""A target whose centre is farther than this from the tool's point is not held, m."""
+if TYPE_CHECKING:
+    from fixation_gym.envs.rehearsal import Rehearsal
+
 _STEEP, _STEEP_TURNED = math.radians(55.0), math.radians(75.0)
 """Elevation below which an approach is avoided where possible, for round targets and for those the hand turns to."""
-_PALM_ROOM = round(ROBOT.hand.palm - 0.002, 4)
-"""How deep a body may be that is held at its centre, m: 2 mm stay free before the palm."""
-_GAINS = open_loop.OpenLoopGains()
-_MOVED = 0.02
-"""A target that is farther than this from where it was aimed at is aimed at again, m."""
-_NEAR_ANGLE, _NEAR_ROLL = math.radians(2.0), math.radians(3.0)
-"""It goes in when it looks along its way this nearly, and its hand is turned as the grasp needs: a hand that turns on
-the way in meets what stands beside the way."""
-_ARRIVED, _BACK = 0.0015, 0.003
-"""The fingers close within this of their goal, m: a thin thing that is held above its middle slips. Backing off need
-not be so exact."""
-_PHASES = ("fixate", "approach", "grasp", "close", "lift")
+_MARGINS = (0.03, 0.02, 0.01, 0.0)
+"""Room around the hand on a straight way, the best first, m."""
+_BARRED = 100
+"""Rank of ways that are not free."""
+_NEARBY = np.radians(np.linspace(-12.0, 12.0, 9))
+"""Angles from the scene's free way to others that are looked at, rad."""
+_ALIKE = math.radians(10.0)
+"""A way this near to one by which a grasp failed would fail, too, rad."""
+_ROOM = 0.005
+"""Least distance of the whole arm from obstacles in a rehearsal that is good enough, m ..."""
+_REHEARSALS = 20
+"""... and how many ways are rehearsed until one is."""
 
 
-class OraclePolicy:
-    """Circles the target until a straight approach is free, goes in, grasps, lifts; uses true poses only.
+@dataclass(frozen=True, eq=False)
+class _World:
+    """What a policy that rehearses looks into."""
 
-    It knows where every obstacle will ever be, but not that the target will be pushed: when the target has moved, or
-    the hand is empty, it backs off and starts again.
+    sim: Rehearsal
+    scene: SceneSpec
 
-    A subclass that overrides ``choose`` and ``come_in`` takes another way with the same motions.
+
+class OraclePolicy(PrivilegedPolicy):
+    """Takes the easiest way that is free for hand and arm, from here to the lift, as it finds by rehearsing it.
+
+    It knows where every obstacle will ever be.
     """
 
-    view_distance = VIEW_DISTANCE
-
-    def __init__(self, env: SimulatedWorld) -> None:
-        """Look into ``env``, such as an unwrapped ``FixationPick-v0``."""
-        self._env = env
-        self.estimate: Estimate | None = None
-        self.reset()
-
     def reset(self, seed: int | None = None) -> None:
-        """Forget the last episode. The behaviour is deterministic; ``seed`` is not used."""
-        self._phase = "fixate"
-        self._phase_start = 0.0
-        self._aim = np.full(3, np.inf)
-        self._now = 0.0
-        self._direction, self._grip = np.array([0.0, 0.0, 1.0]), -1
-        self._goal = np.zeros(3)
-        self.estimate = None
-
-    def act(self, obs: Mapping[str, Any]) -> Action:
-        """Action of shape (7,); of the observation only the time is used."""
-        pose = self._env.sim.arm_state().camera_pose
-        target = self._env.sim.body_position("target")
-        self._now = float(obs["time"][0])
-        self._advance(pose, target, self._now)
-        if self._phase in ("fixate", "approach"):
-            twist = self._fixating_twist(pose, target)
-        elif self._phase == "close":
-            twist = np.zeros(6)
-        else:
-            twist = servo_laws.pose_twist(pose, self._waypoint(pose), 4.0, 0.12)
-        depth = float(pose[:3, 2] @ (target - pose[:3, 3]))
-        self.estimate = Estimate(depth, 1e-6, self._phase)
-        gripper = 1.0 if self._phase in ("close", "lift") else -1.0
-        return np.array([*gaze.within_speed(twist) / ROBOT.arm.twist_limits, gripper], dtype=np.float32)
-
-    # -- phases --------------------------------------------------------------------------------------------------
-
-    def _advance(self, pose: FloatArray, target: FloatArray, time: float) -> None:
-        """Choose the phase in which to act now."""
-        elapsed = time - self._phase_start
-        distance = float(np.linalg.norm(pose[:3, 3] - target))
-        if self._phase in ("fixate", "approach", "grasp") and np.linalg.norm(target - self._aim) > _MOVED:
-            self._aim_at(pose, target, time)
-            if self._phase == "grasp":
-                self._begin("recover", pose, target, time)
-            elif not self._is_lined_up(pose, target):
-                self._begin("fixate", pose, target, time)
-            return
-        held = np.linalg.norm(target - self._env.sim.tool_position()) < _HELD
-        if self._phase in ("close", "lift") and elapsed > _GAINS.close_seconds and not held:
-            self._begin("recover", pose, target, time)
-            return
-        left = float(np.linalg.norm(self._goal - pose[:3, 3]))
-        arrived, near = left < _ARRIVED, left < _BACK
-        done = {
-            "fixate": self._is_lined_up(pose, target) or elapsed > 8.0,
-            "approach": distance < GRASP_DISTANCE * 1.03,
-            "grasp": arrived or elapsed > 4.0,
-            "close": elapsed > _GAINS.close_seconds,
-            "lift": False,
-            "recover": near or elapsed > 3.0,
-        }[self._phase]
-        if done and self._phase == "recover":
-            self._aim_at(pose, target, time)
-            self._begin("fixate", pose, target, time)
-        elif done:
-            self._begin(_PHASES[_PHASES.index(self._phase) + 1], pose, target, time)
+        """Forget the last episode."""
+        super().reset(seed)
+        self._tried: list[Choice] = []
 
     def _begin(self, phase: str, pose: FloatArray, target: FloatArray, time: float) -> None:
-        self._phase, self._phase_start = phase, time
+        super()._begin(phase, pose, target, time)
         if phase == "grasp":
-            self._goal = self._grasp_point(pose, target) - pose[:3, :3] @ ROBOT.tool_in_camera
-        elif phase == "lift":
-            self._goal = open_loop.lifted(pose, _GAINS.lift_height)
-        elif phase == "recover":
-            back = max(0.0, _RETREAT_DISTANCE - float(pose[:3, 2] @ (target - pose[:3, 3])))
-            self._goal = pose[:3, 3] - back * pose[:3, 2]
+            self._tried.append((self._direction, self._grip))
 
-    def _aim_at(self, pose: FloatArray, target: FloatArray, time: float) -> None:
-        self._direction, self._grip = self.choose(pose, target, time)
-        self._aim = target.copy()
+    def choose(self, pose: FloatArray, target: FloatArray, time: float) -> Choice:
+        """The first of the ways, best first, on which nothing comes near the arm, or that with the most room."""
+        best, most = None, -math.inf
+        for way in self._ways(pose, target, time)[:_REHEARSALS]:
+            room = _rehearsed_room(self._env, self._scene, way, time, most)
+            if room > most:
+                best, most = way, room
+            if most > _ROOM:
+                break
+        assert best is not None, "some way has more room than none"
+        return best
 
-    # -- the way -------------------------------------------------------------------------------------------------
-
-    def choose(self, pose: FloatArray, target: FloatArray, time: float) -> tuple[FloatArray, int]:
-        """Choose the free approach that is easiest to take up, with as much room as there is.
-
-        Args:
-            pose: T_base_cam, shape (4, 4).
-            target: its centre in base, shape (3,), m.
-            time: since reset, s.
-
-        Returns:
-            Unit vector from the target to the camera, shape (3,), in base, and the axis of the target along which the
-            fingers close; -1: any.
-        """
+    def _ways(self, pose: FloatArray, target: FloatArray, time: float) -> list[Choice]:
+        """Straight ways, best first: free, with a grip that holds, not tried before, with much room, easy to take up."""
         ways = reachable_directions(target)
-        if self._scene.free_way is not None:  # between those of the grid
-            ways = np.vstack([ways, approach_directions(*np.array(self._scene.free_way)[:, None])])
-        axes = grips_of(self._scene.target.shape)
+        if self._scene.free_way is not None:  # more closely where all may be free
+            ways = np.vstack([ways, _around(*self._scene.free_way)])
+        spec, rotation = self._scene.target, self._rotation
+        axes = grips_of(spec.shape)
         directions = np.repeat(ways, len(axes), axis=0)
         grips = np.resize(axes, len(directions))
-        turns = rolls(directions, grips, self._rotation)
+        turns = rolls(directions, grips, rotation)
         present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
         from_base = np.linalg.norm((target + VIEW_DISTANCE * directions)[:, :2], axis=1)
         strain = 4.0 * np.maximum(0.0, ROBOT.arm.reach.folded - from_base) + 0.3 * np.abs(turns)
@@ -162,28 +91,15 @@ class OraclePolicy:
         # Flat fingers touch the table, so flatness costs more than the way.
         cost = np.arccos(np.clip(directions @ present, -1.0, 1.0)) + strain + 1.5 * flatness
         boxes = self._boxes(time)
-        held = slants(directions, grips, self._rotation) < LARGEST_SLANT
-        for suitable, margin in product((held, ~held), (0.03, 0.02, 0.01, 0.0)):
-            free = suitable & free_directions(target, boxes, directions, margin, turns)
-            if free.any():
-                cost = np.where(free, cost, np.inf)
-                break
-        best = int(np.argmin(cost))
-        return directions[best], int(grips[best])
-
-    def come_in(self, depth: float, seconds: float) -> tuple[FloatArray, float]:
-        """Direction from which to look, shape (3,), in base, and speed of the approach, m/s.
-
-        Args:
-            depth: of the target, m; inf before the approach.
-            seconds: since the approach began, s.
-        """
-        return self._direction, _SPEED
-
-    @property
-    def _rotation(self) -> FloatArray:
-        """Of the target, shape (3, 3), in base."""
-        return self._env.sim.data.body("target").xmat.reshape(3, 3)
+        free = sum(free_directions(target, boxes, directions, margin, turns).astype(int) for margin in _MARGINS)
+        wide = widths(directions, grips, rotation, spec.box.half_extent)[:, None] > ROBOT.hand.finger_span
+        slanted = slants(directions, grips, rotation) > LARGEST_SLANT
+        tried = np.zeros(len(directions), bool)
+        for direction, grip in self._tried:
+            tried |= (directions @ direction > math.cos(_ALIKE)) & (grips == grip)
+        bad = slanted.astype(int) + tried + (spec.shape == "box") * wide.sum(axis=1)
+        rank = (len(_MARGINS) + 1) * bad + len(_MARGINS) - free + _BARRED * (free == 0)
+        return [(directions[way], int(grips[way])) for way in np.lexsort((cost, rank))]
 
     def _boxes(self, time: float) -> BoxSet:
         """Boxes around all places where something will be from now on."""
@@ -193,87 +109,46 @@ class OraclePolicy:
             boxes.append(obstacle.last_boxes if over else obstacle.boxes)
         return joined(boxes)
 
-    @property
-    def _scene(self) -> SceneSpec:
-        scene = self._env.scene
-        assert scene is not None, "reset the environment before the policy acts"
-        return scene
 
-    def _wanted(self, pose: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:
-        """Direction from which to look now, shape (3,), and speed of the approach, m/s."""
-        if self._phase != "approach":
-            return self.come_in(math.inf, 0.0)
-        return self.come_in(float(pose[:3, 2] @ (target - pose[:3, 3])), self._now - self._phase_start)
+class _GivenWay(PrivilegedPolicy):
+    """Takes a way that was chosen."""
 
-    def _angle(self, pose: FloatArray, target: FloatArray) -> float:
-        """Angle between the present and the wanted direction, rad."""
-        present = (pose[:3, 3] - target) / np.linalg.norm(pose[:3, 3] - target)
-        return math.acos(float(np.clip(present @ self._wanted(pose, target)[0], -1.0, 1.0)))
+    def __init__(self, world: SimulatedWorld, way: Choice) -> None:
+        self._way = way
+        super().__init__(world)
 
-    def _is_lined_up(self, pose: FloatArray, target: FloatArray) -> bool:
-        """Whether the hand is on its way, and turned as it will be at the target."""
-        return self._angle(pose, target) < _NEAR_ANGLE and abs(self._roll_error(pose)) < _NEAR_ROLL
-
-    def _grasp_point(self, pose: FloatArray, target: FloatArray) -> FloatArray:
-        """Where the tool goes, shape (3,), in base: to the target's centre, but neither palm nor fingers touch."""
-        point = target - self._back_off(pose[:3, 2]) * pose[:3, 2]
-        lowest = open_loop.lowest_grasp(pose, float(target[2]), ROBOT.workspace.table_height, _GAINS)
-        point[2] = max(point[2], lowest)
-        return point
-
-    def _back_off(self, axis: FloatArray) -> float:
-        """How far before the target's centre the tool stops so that the palm does not touch it, m."""
-        spec, rotation = self._scene.target, self._rotation
-        half = np.array(target_shape(spec.shape).half_extent) * spec.scale
-        x, y, z = np.abs(rotation.T @ axis)
-        depth = {
-            "box": half @ [x, y, z],
-            "cylinder": half[0] * math.hypot(x, y) + half[2] * z,
-            "ring": half[0] * math.hypot(x, y) + half[2] * z,
-            "ball": half[0],
-            "duck": 0.0,  # only its body is broad enough to be held; what is above it fits between the fingers
-        }[spec.shape]
-        return float(np.clip(depth - _PALM_ROOM, 0.0, 0.02))
-
-    # -- motions -------------------------------------------------------------------------------------------------
-
-    def _waypoint(self, pose: FloatArray) -> FloatArray:
-        """In the grasp, first in line with the approach axis, then forward."""
-        if self._phase != "grasp":
-            return self._goal
-        return servo_laws.funnel_waypoint(pose, self._goal, slope=2.0, length=0.06)
-
-    def _fixating_twist(self, pose: FloatArray, target: FloatArray) -> FloatArray:
-        point = pose[:3, :3].T @ (target - pose[:3, 3])
-        centroid, depth = point[:2] / point[2], float(point[2])
-        towards, speed = self._wanted(pose, target)
-        desired = GRASP_DISTANCE
-        if self._phase == "fixate":
-            desired, towards, speed = self.view_distance, _next_direction(pose, target, towards), _SPEED
-        offset = pose[:3, :3].T @ (target + depth * towards - pose[:3, 3])
-        lateral = 3.0 * offset[:2]
-        lateral *= min(1.0, 0.13 / max(float(np.linalg.norm(lateral)), 1e-9))
-        forward = float(np.clip(1.5 * (depth - desired), -_SPEED, speed))
-        v = np.array([*lateral, forward])
-        roll = servo_laws.roll_rate(self._roll_error(pose), 2.0)
-        w = servo_laws.gaze_rotation(centroid, 4.0, 1.0 / depth, v, roll)
-        return np.array([*v, *w, roll])
-
-    def _roll_error(self, pose: FloatArray) -> float:
-        """Level for round targets, otherwise across the target's chosen axis, rad."""
-        if self._grip < 0:
-            level = math.atan2(pose[2, 0], -pose[2, 1])
-            return level * float(np.hypot(pose[2, 0], pose[2, 1]))
-        across = pose[:3, :3].T @ self._rotation[:, self._grip]
-        return float(half_turn(math.atan2(across[1], across[0])))
+    def choose(self, pose: FloatArray, target: FloatArray, time: float) -> Choice:
+        return self._way
 
 
-def _next_direction(pose: FloatArray, target: FloatArray, direction: FloatArray) -> FloatArray:
-    """Direction to go to on the way to another one: up first, down last, around in between."""
-    present = pose[:3, 3] - target
-    height = math.atan2(present[2], math.hypot(present[0], present[1]))
-    wanted = math.asin(float(np.clip(direction[2], -1.0, 1.0)))
-    if wanted < height + math.radians(8.0):
-        return direction
-    azimuth = math.atan2(-present[1], -present[0])
-    return approach_directions(np.array([azimuth]), np.array([wanted]))[0]
+def _around(azimuth: float, elevation: float) -> FloatArray:
+    """Unit vectors from target to camera, shape (n, 3), in base, close together around one; angles in rad."""
+    rows = elevation + _NEARBY
+    rows = rows[(rows >= ROBOT.arm.reach.lowest) & (rows <= ROBOT.arm.reach.highest)]
+    return np.vstack([approach_directions(azimuth + _NEARBY / math.cos(row), np.array([row])) for row in rows])
+
+
+def _rehearsed_room(world: SimulatedWorld, scene: SceneSpec, way: Choice, time: float, enough: float) -> float:
+    """Least distance of the arm from obstacles from now to the lift, m; -1 if it does not get there in time.
+
+    Args:
+        world: as it is now; it does not change.
+        scene: what stands in it.
+        way: to rehearse.
+        time: since reset, s.
+        enough: the rehearsal ends early at a distance below this, m.
+    """
+    from fixation_gym.envs.rehearsal import Rehearsal
+
+    sim = Rehearsal(world.sim)
+    policy, room, period = _GivenWay(_World(sim, scene), way), math.inf, 1.0 / config.CONTROL_FREQUENCY
+    while sim.target_rise() < config.LIFT_HEIGHT:
+        if time > config.EPISODE_SECONDS - config.HOLD_SECONDS:
+            return -1.0
+        action = policy.act({"time": [time]})
+        sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]))
+        time += period
+        room = min(room, sim.clearance())
+        if room < enough:
+            break
+    return room
