@@ -9,14 +9,10 @@ import copy
 import mujoco
 import numpy as np
 
-from fixation_gym.control.computed_torque import camera_kinematics
-from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
+from fixation_gym.control.resolved_rate import joint_velocities
 from fixation_gym.envs.motion import planned
 from fixation_gym.envs.pick_sim import PickSim
 from fixation_gym.types import FloatArray
-
-_LONGEST_STEP = 0.02
-"""Of the integration of joint velocities, s."""
 
 
 class Rehearsal(PickSim):
@@ -35,20 +31,14 @@ class Rehearsal(PickSim):
 
     def step(self, camera_twist: FloatArray, gripper: float) -> tuple[FloatArray, bool]:
         """Go on by one control period; arguments and results as in ``PickSim.step``, but nothing is ever hit."""
-        data, arm = self.data, self._arm_dynamics
-        posture, lower, upper, speed, *_ = self._task.joints
-        limits = JointLimits(lower, upper, speed)
-        period = self.substeps * self.model.opt.timestep
-        steps = max(1, round(period / _LONGEST_STEP))
-        before = self.tool_position()
-        for _ in range(steps):
-            _, jacobian = camera_kinematics(arm, self._task.hand_eye)
-            velocity = joint_velocities(jacobian, camera_twist, arm.joint_pos, posture, limits)
-            arm.joint_pos[:] += velocity * (period / steps)
-            mujoco.mj_kinematics(self.model, data)
+        data, period = self.data, self.substeps * self.model.opt.timestep
+        state, tool = self.arm_state(), self.tool_position()
+        velocity = joint_velocities(state.jacobian, camera_twist, state.joint_pos, self._posture, self._limits)
+        data.qpos[self._arm] += period * velocity
+        mujoco.mj_kinematics(self.model, data)
         data.time += period
         if gripper > 0.0:
-            self._place_of("target")[:] += self.tool_position() - before
+            self._place_of("target")[:] += self.tool_position() - tool
         for body, motion in self._motions.items():
             if body != "target":
                 self._place_of(body)[:] = self._base_position + self._rest[body]

@@ -34,7 +34,7 @@ _ALIKE = math.radians(10.0)
 """A way this near to one by which a grasp failed would fail, too, rad."""
 _ROOM = 0.005
 """Least distance of the whole arm from obstacles in a rehearsal that is good enough, m ..."""
-_REHEARSALS = 20
+_REHEARSALS = 40
 """... and how many ways are rehearsed until one is."""
 
 
@@ -136,7 +136,7 @@ def _rehearsed_room(world: SimulatedWorld, scene: SceneSpec, way: Choice, time: 
         scene: what stands in it.
         way: to rehearse.
         time: since reset, s.
-        enough: the rehearsal ends early at a distance below this, m.
+        enough: the rehearsal ends early at a distance below this, or at a touch, m.
     """
     from fixation_gym.envs.rehearsal import Rehearsal
 
@@ -149,6 +149,6 @@ def _rehearsed_room(world: SimulatedWorld, scene: SceneSpec, way: Choice, time: 
         sim.step(action[:6] * ROBOT.arm.twist_limits, float(action[6]))
         time += period
         room = min(room, sim.clearance())
-        if room < enough:
+        if room < max(enough, 0.0):
             break
     return room
