@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MUJOCO_FILES = {
     f"fixation_gym/envs/{name}.py"
-    for name in ("pick_sim", "task_model", "contacts", "offscreen", "rendering", "textures", "truth_view")
+    for name in ("pick_sim", "rehearsal", "task_model", "contacts", "offscreen", "rendering", "textures", "truth_view")
 } | {f"fixation_gym/envs/{name}.py" for name in ("privileged_map", "photoreal/solids", "photoreal/view")}
 FORBIDDEN = {
     "fixation_gym/robots": ("fixation_gym.envs", "gymnasium", "mujoco", "robosuite", "torch"),

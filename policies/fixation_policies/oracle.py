@@ -47,7 +47,7 @@ class _World:
 
 
 class OraclePolicy(PrivilegedPolicy):
-    """Takes the easiest way that is free for hand and arm, from here to the lift, as it finds by rehearsing it.
+    """Takes the easiest straight way that is free for hand and arm from here to the lift: it rehearses them.
 
     It knows where every obstacle will ever be.
     """
@@ -63,7 +63,9 @@ class OraclePolicy(PrivilegedPolicy):
             self._tried.append((self._direction, self._grip))
 
     def choose(self, pose: FloatArray, target: FloatArray, time: float) -> Choice:
-        """The first of the ways, best first, on which nothing comes near the arm, or that with the most room."""
+        """Choose the first way on which nothing comes near the arm, or else that with the most room."""
+        if self._phase == "grasp":  # it backs off first, and then chooses
+            return self._direction, self._grip
         best, most = None, -math.inf
         for way in self._ways(pose, target, time)[:_REHEARSALS]:
             room = _rehearsed_room(self._env, self._scene, way, time, most)
@@ -75,7 +77,7 @@ class OraclePolicy(PrivilegedPolicy):
         return best
 
     def _ways(self, pose: FloatArray, target: FloatArray, time: float) -> list[Choice]:
-        """Straight ways, best first: free, with a grip that holds, not tried before, with much room, easy to take up."""
+        """Straight ways, best first: free by boxes, with a grip that holds, not tried before, with room, easy to take."""
         ways = reachable_directions(target)
         if self._scene.free_way is not None:  # more closely where all may be free
             ways = np.vstack([ways, _around(*self._scene.free_way)])

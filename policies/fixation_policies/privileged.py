@@ -50,8 +50,6 @@ class PrivilegedPolicy:
     """
 
     view_distance = VIEW_DISTANCE
-    largest_back_off = 0.02
-    """How far before the target's centre the tool may stop, m."""
 
     def __init__(self, env: SimulatedWorld) -> None:
         """Look into ``env``, such as an unwrapped ``FixationPick-v0``."""
@@ -203,7 +201,7 @@ class PrivilegedPolicy:
             "ball": half[0],
             "duck": 0.0,  # only its body is broad enough to be held; what is above it fits between the fingers
         }[spec.shape]
-        return float(np.clip(depth - _PALM_ROOM, 0.0, self.largest_back_off))
+        return float(np.clip(depth - _PALM_ROOM, 0.0, 0.02))
 
     # -- motions -------------------------------------------------------------------------------------------------
 
