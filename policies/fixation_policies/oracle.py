@@ -77,7 +77,7 @@ class OraclePolicy(PrivilegedPolicy):
         return best
 
     def _ways(self, pose: FloatArray, target: FloatArray, time: float) -> list[Choice]:
-        """Straight ways, best first: free by boxes, with a grip that holds, not tried before, with room, easy to take."""
+        """Straight ways, best first: free for the hand, not tried before, with a grip that holds, with room, easy."""
         ways = reachable_directions(target)
         if self._scene.free_way is not None:  # more closely where all may be free
             ways = np.vstack([ways, _around(*self._scene.free_way)])
