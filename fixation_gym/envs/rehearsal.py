@@ -18,8 +18,8 @@ from fixation_gym.types import FloatArray
 class Rehearsal(PickSim):
     """A copy in which nothing has weight or force: joints do as they are told, obstacles keep to their planned ways.
 
-    The target stays where it is, but a hand whose fingers close takes it along. So there is no slip and no push; what
-    a plan costs is a hundredth of the simulation's arithmetic. The original does not notice.
+    The target stays where it is, but a hand whose fingers close takes it along: there is no slip and no push. The
+    original does not notice.
     """
 
     def __init__(self, sim: PickSim) -> None:
