@@ -138,7 +138,8 @@ def draw_for_ways(
         menu: what to draw from.
         rng: generator.
     """
-    drafts, kept = _empty(counts[0] + counts[1]), 0
+    drafts = _empty(counts[0] + counts[1])
+    kept = drafts.ends[0]  # 0 from an array: for a literal, numba would compile all that takes it once more
     for index in range(counts[0] + counts[1]):
         first = index < counts[0]
         if index == counts[0] and kept == 0:
@@ -155,9 +156,10 @@ def draw_across(
     count: int, sight: int, past: tuple[float, float], aim: Aim, room: Room, menu: Menu, rng: np.random.Generator
 ) -> Drafts:
     """Draw first obstacles that all stand beyond one way."""
-    drafts, kept = _empty(count), 0
+    drafts = _empty(count)
+    kept, first = drafts.ends[0], count > 0  # 0 and True, and no literals, as above
     for _ in range(count):
-        kept += _draw(drafts, kept, True, aim.ways[sight], past, aim, room, menu, rng)
+        kept += _draw(drafts, kept, first, aim.ways[sight], past, aim, room, menu, rng)
     return _filled(drafts, kept)
 
 
