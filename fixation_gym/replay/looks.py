@@ -47,6 +47,8 @@ class Look:
     truth: Truth
     map_truth: Truth | None
     """Of the frame that flow and map belong to, which is the one before; None for the first frame."""
+    map_rgb: ImageArray | None
+    """Picture of that frame, shape (H, W, 3)."""
     perception_s: float
     """Time that perception took, s."""
 
@@ -100,6 +102,7 @@ def looks(
     """
     box = straightener.box(target.box)
     before: Truth | None = None
+    rgb_before: ImageArray | None = None
     for frame in frames:
         assert frame.camera_pose is not None
         rgb, mask = straightener.image(frame.image()), straightener.mask(frame)
@@ -108,8 +111,8 @@ def looks(
         percept = perception.update(Observation.of_camera(frame.time, rgb, frame.camera_pose, box, given))
         took = time.perf_counter() - started
         truth = _truth(frame, mask, straightener.depth(frame), percept)
-        yield Look(frame.name, rgb, frame.camera_pose, percept, truth, before, took)
-        before = truth
+        yield Look(frame.name, rgb, frame.camera_pose, percept, truth, before, rgb_before, took)
+        before, rgb_before = truth, rgb
 
 
 def _truth(frame: RecordedFrame, mask: MaskArray | None, depth: Float32Array | None, percept: Percept) -> Truth:

@@ -24,6 +24,7 @@ from fixation_gym.perception.distance.calibrating_filter import CalibratingSetti
 from fixation_gym.perception.drawing import draw_overlay
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
+from fixation_gym.perception.zero_flow.answering_pixels import answering_pixels
 from fixation_gym.recordings.catalogue import open_recording
 from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.recordings.stamps import OrderedFrames, in_order
@@ -165,7 +166,9 @@ class _Done:
         row = row_of(look, self._camera, shared)
         before = look.map_truth
         if not row["no_map"] and before is not None and before.depth is not None and before.distance_m is not None:
-            self._counts += map_counts(look.percept.zfc, before.depth, before.distance_m, before.target)
+            assert look.map_rgb is not None
+            answering = answering_pixels(look.percept.zfc, look.map_rgb)
+            self._counts += map_counts(look.percept.zfc, answering, before.depth, before.distance_m, before.target)
             self._maps += 1
         self.rows.append(row)
         self.seconds.append(look.perception_s)

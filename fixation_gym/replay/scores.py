@@ -1,10 +1,12 @@
 """What a replay is judged by, where a recording has truth: distance, map against depth, mask.
 
-A pixel of the map is asked about if it has evidence and its true depth differs from the target's by more than 10 %.
-``sign_right``: share of these whose side is right. ``precision``: of those called nearer, share that is. ``recall``: of
-those that are nearer, share called so. ``false_alarms``: of those that are farther, share called nearer. A cell of the
-32 x 32 map is clear if all that has depth in it is farther; ``clear_cells_alarmed`` is the share of clear cells in
-which nearer prevails.
+A pixel of the map is asked about if it answers for itself (``answering_pixels``) and its true depth differs from the
+target's by more than 10 %. ``sign_right``: share of these whose side is right. ``precision``: of those called nearer,
+share that is. ``recall``: of those that are nearer, share called so. ``false_alarms``: of those that are farther, share
+called nearer. ``found``: of all nearer pixels, asked or not, share called so. ``evidence_share`` and
+``found_of_evidence`` are the share asked and ``found`` if every pixel with evidence were asked. A cell of the 32 x 32
+map is clear if all that has depth in it is farther; ``clear_cells_alarmed`` is the share of clear cells in which nearer
+prevails.
 """
 
 from __future__ import annotations
@@ -34,11 +36,14 @@ def overlap(found: MaskArray, true: MaskArray) -> float:
     return np.count_nonzero(found & true) / union if union else 1.0
 
 
-def map_counts(zero_flow: ZeroFlow, depth: Float32Array, distance: float, target: MaskArray) -> Counter[str]:
+def map_counts(
+    zero_flow: ZeroFlow, answering: MaskArray, depth: Float32Array, distance: float, target: MaskArray
+) -> Counter[str]:
     """Counts of pixels and cells of one map; sums over frames make ``map_summary``.
 
     Args:
         zero_flow: the map.
+        answering: pixels that are asked, shape (h, w).
         depth: true depth of the same picture, shape (H, W), m; NaN where there is none.
         distance: true depth of the target in it, m.
         target: its pixels, shape (H, W), in which nothing is asked.
@@ -50,17 +55,19 @@ def map_counts(zero_flow: ZeroFlow, depth: Float32Array, distance: float, target
     with np.errstate(invalid="ignore"):
         nearer, farther = (relative < -DEPTH_MARGIN) & ~own, (relative > DEPTH_MARGIN) & ~own
         not_farther = np.isfinite(relative) & ~farther
-    seen = zero_flow.supported
-    called = seen & (zero_flow.p_nearer > 0.5)
+    called = zero_flow.p_nearer > 0.5
     has_clear, has_other = (_any_in_cells(mask) for mask in (farther, not_farther))
     clear = has_clear & ~has_other
     alarmed = clear & (zero_flow.cells > UNKNOWN)
     counted = {
-        "nearer": seen & nearer,
-        "nearer_called": called & nearer,
-        "farther": seen & farther,
-        "farther_called": called & farther,
+        "nearer": answering & nearer,
+        "nearer_called": answering & nearer & called,
+        "farther": answering & farther,
+        "farther_called": answering & farther & called,
+        "true_nearer": nearer,
         "true_pixels": nearer | farther,
+        "evidence": zero_flow.supported & (nearer | farther),
+        "evidence_nearer_called": zero_flow.supported & nearer & called,
         "clear_cells": clear,
         "clear_cells_alarmed": alarmed,
     }
@@ -85,6 +92,9 @@ def map_summary(counts: Mapping[str, int], frames: int) -> dict[str, Any]:
         "precision": _share(counts["nearer_called"], counts["nearer_called"] + counts["farther_called"]),
         "recall": _share(counts["nearer_called"], counts["nearer"]),
         "false_alarms": _share(counts["farther_called"], counts["farther"]),
+        "found": _share(counts["nearer_called"], counts["true_nearer"]),
+        "evidence_share": _share(counts["evidence"], counts["true_pixels"]),
+        "found_of_evidence": _share(counts["evidence_nearer_called"], counts["true_nearer"]),
         "clear_cells_alarmed": _share(counts["clear_cells_alarmed"], counts["clear_cells"]),
         "margin": DEPTH_MARGIN,
     }

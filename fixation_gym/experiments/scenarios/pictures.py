@@ -14,6 +14,7 @@ from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
 from fixation_gym.experiments.scenarios.scores import PixelTruth, calls, pixel_truth
 from fixation_gym.perception import draw_overlay
 from fixation_gym.perception.drawing import BEHIND_RGB, FRONT_RGB, MOVING_RGB
+from fixation_gym.perception.zero_flow.answering_pixels import answering_pixels
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
 ROWS = ("camera", "flow", "paper's rule", "exact", "truth")
@@ -64,7 +65,7 @@ def _film_scene(rig: ScenarioRig, scene: str, rng: np.random.Generator, path: Pa
 def panels(look: Look, answers: PixelTruth) -> list[ImageArray]:
     """Pictures of one look in the order of ``ROWS``, each of shape (H, W, 3)."""
     size = (look.image.shape[1], look.image.shape[0])
-    called, known = calls(look), look.percept.zfc.supported
+    called, known = calls(look), answering_pixels(look.percept.zfc, look.image)
     maps = [sides(known & called[rule], known & ~called[rule]) for rule in ("paper", "exact")]
     maps[1][look.percept.zfc.moving] = MOVING_RGB
     small = [flow_colours(look.percept.flow.flow), *maps, sides(answers.side > 0.0, answers.side < 0.0)]

@@ -6,7 +6,10 @@ see-through things show something on the other side, not the robot in a mirror, 
 the truth is the virtual image; curved mirrors, whose images have no one place, do not count. Of see-through things and
 mirrors in front it is also counted how many of their pixels are called in front, whatever is seen in them. Obstacles
 count with their surface; see-through things and mirrors are obstacles, and so is the stand under the fixated object,
-about which no vote is held. All rules are asked at the same pixels.
+about which no vote is held.
+
+All rules are asked at the same pixels: those that answer for themselves (``answering_pixels``). Counted beside: how
+many these are, and how the rules do at all pixels with evidence (``supported``), of which map and votes are made.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from fixation_gym.envs.truth_view import Truth
 from fixation_gym.experiments.scenarios.rig import Look, ScenarioRig
 from fixation_gym.experiments.scenarios.rules import SURFACES, Rule, plane_front
 from fixation_gym.experiments.scenarios.scenes import Instance
+from fixation_gym.perception.zero_flow.answering_pixels import answering_pixels
 from fixation_gym.perception.zero_flow.dot_product_rule import dot_product_front
 from fixation_gym.perception.zero_flow.region_vote import VoteSettings, region_votes
 from fixation_gym.robots import ROBOT
@@ -33,6 +37,8 @@ INNER_PX = 3
 """Inner pixels are farther than this from depth edges, px of the flow grid: 6 px of the frames that flow is made of."""
 LEAST_REGION_PX = 40
 """Smaller visible parts of obstacles are not asked about, px of the flow grid."""
+THIN_PX = 7
+"""Things in front that are narrower than this are thin, px of the flow grid: a window and its reach do not fit in."""
 _EDGE = 0.12
 """Relative difference of depth within 3x3 pixels that is an edge."""
 
@@ -48,6 +54,8 @@ class PixelTruth:
     """Virtual images of static things that lie clearly behind the fixated object."""
     image_of_obstacle: MaskArray
     """Those of obstacles."""
+    thin: MaskArray
+    """Parts of obstacles in front that are narrower than ``THIN_PX``."""
     surfaces: dict[str, MaskArray]
     """Pixels of each of ``SURFACES`` that is clearly in front itself, whatever is seen in it."""
     places: dict[str, MaskArray]
@@ -82,6 +90,7 @@ def pixel_truth(rig: ScenarioRig, instance: Instance, truth: Truth, target_depth
         inner=near_edge == 0,
         image=image,
         image_of_obstacle=image & np.char.startswith(image_owner, "obstacle"),
+        thin=_thin(on_obstacle & ahead),
         surfaces={name: mask & ahead for name, mask in surfaces.items()},
         places=dict(zip(PLACES, (on_obstacle, on_table, ~on_obstacle & ~on_table), strict=True)),
         regions={index: np.isin(truth.geom, geoms) for index, geoms in enumerate(rig.thing_geoms)},
@@ -116,8 +125,14 @@ def _edges(depth: FloatArray) -> MaskArray:
     return np.asarray(cv2.dilate(small, kernel) > (1.0 + _EDGE) * cv2.erode(small, kernel))
 
 
+def _thin(mask: MaskArray) -> MaskArray:
+    """Parts of a mask in which no square of ``THIN_PX`` fits."""
+    wide = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((THIN_PX, THIN_PX), np.uint8))
+    return mask & (wide == 0)
+
+
 def calls(look: Look) -> dict[Rule, MaskArray]:
-    """Pixels that each rule calls nearer, shape (h, w); only those that are ``supported`` count."""
+    """Pixels that each rule calls nearer, shape (h, w); only those that answer count."""
     percept, zfc = look.percept, look.percept.zfc
     table = ROBOT.workspace.table_height
     with np.errstate(invalid="ignore"):
@@ -132,41 +147,53 @@ def calls(look: Look) -> dict[Rule, MaskArray]:
 
 def pixel_counts(look: Look, truth: PixelTruth) -> dict[str, dict[str, int]]:
     """Counts per rule; ratios of their sums are the measures."""
-    supported = look.percept.zfc.supported
-    asked = supported & (truth.side != 0.0)
-    front = truth.side > 0.0
-    result: dict[str, dict[str, int]] = {}
-    for rule, called in calls(look).items():
-        right = called == front
+    evidence = look.percept.zfc.supported
+    answering = answering_pixels(look.percept.zfc, look.image)
+    counted = {rule: _counted(truth, evidence, answering, called) for rule, called in calls(look).items()}
+    return {
+        rule: {name: int(np.count_nonzero(mask)) for name, mask in masks.items()} for rule, masks in counted.items()
+    }
 
-        def count(mask: MaskArray) -> int:
-            return int(np.count_nonzero(mask))
 
-        result[rule] = {
-            "asked": count(asked),
-            "right": count(asked & right),
-            "inner": count(asked & truth.inner),
-            "inner_right": count(asked & truth.inner & right),
-            "front": count(asked & front),
-            "front_called": count(asked & front & called),
-            "called": count(asked & called),
-            "surface": count(asked & truth.places["obstacle"] & ~truth.image),
-            "surface_right": count(asked & truth.places["obstacle"] & ~truth.image & right),
-            "inner_obstacle": count(asked & truth.inner & truth.places["obstacle"]),
-            "inner_obstacle_right": count(asked & truth.inner & truth.places["obstacle"] & right),
-            "image": count(asked & truth.image),
-            "inner_image": count(asked & truth.image & truth.inner),
-            "inner_image_behind": count(asked & truth.image & truth.inner & ~called),
-            "image_behind": count(asked & truth.image & ~called),
-            "image_of_obstacle": count(asked & truth.image_of_obstacle),
-            "image_of_obstacle_behind": count(asked & truth.image_of_obstacle & ~called),
-            "pixels": count(truth.side != 0.0),
-            **{f"front_{name}": count(supported & mask) for name, mask in truth.surfaces.items()},
-            **{f"front_{name}_called": count(supported & mask & called) for name, mask in truth.surfaces.items()},
-            **{f"on_{place}": count(asked & mask) for place, mask in truth.places.items()},
-            **{f"on_{place}_right": count(asked & mask & right) for place, mask in truth.places.items()},
-        }
-    return result
+def _counted(truth: PixelTruth, evidence: MaskArray, answering: MaskArray, called: MaskArray) -> dict[str, MaskArray]:
+    """What is counted of one rule, each of shape (h, w)."""
+    known, front = truth.side != 0.0, truth.side > 0.0
+    asked, right = answering & known, called == front
+    obstacle, image = truth.places["obstacle"], truth.image
+    tested, in_front, thin = evidence & known & obstacle, front & obstacle, front & truth.thin
+    part = {
+        "asked": asked,
+        "inner": asked & truth.inner,
+        "surface": asked & obstacle & ~image,
+        "inner_obstacle": asked & truth.inner & obstacle,
+        "evidence_obstacle": tested,
+        "evidence_surface": tested & ~image,
+        **{f"on_{place}": asked & mask for place, mask in truth.places.items()},
+    }
+    return {
+        **part,
+        "right": asked & right,
+        **{f"{name}_right": mask & right for name, mask in part.items() if name != "asked"},
+        "front": asked & front,
+        "front_called": asked & front & called,
+        "called": asked & called,
+        "image": asked & image,
+        "inner_image": asked & image & truth.inner,
+        "inner_image_behind": asked & image & truth.inner & ~called,
+        "image_behind": asked & image & ~called,
+        "image_of_obstacle": asked & truth.image_of_obstacle,
+        "image_of_obstacle_behind": asked & truth.image_of_obstacle & ~called,
+        "pixels": known,
+        "obstacle_pixels": known & obstacle,
+        "front_obstacle": in_front,
+        "front_obstacle_called": in_front & answering & called,
+        "evidence_front_obstacle_called": in_front & evidence & called,
+        "thin": thin,
+        "thin_called": thin & answering & called,
+        "evidence_thin_called": thin & evidence & called,
+        **{f"front_{name}": evidence & mask for name, mask in truth.surfaces.items()},
+        **{f"front_{name}_called": evidence & mask & called for name, mask in truth.surfaces.items()},
+    }
 
 
 def votes(look: Look, region: MaskArray, settings: VoteSettings) -> dict[Rule, tuple[float, float]]:

@@ -22,6 +22,7 @@ from fixation_gym.experiments.scenarios.scores import (
     votes,
 )
 from fixation_gym.geometry.rigid import inverse, transform
+from fixation_gym.perception.zero_flow.answering_pixels import answering_pixels
 from fixation_gym.perception.zero_flow.obstacle_memory import MemorySettings, ObstacleMemory, believed_points, remember
 from fixation_gym.perception.zero_flow.region_vote import Side, VoteSettings, decide
 from fixation_gym.perception.zero_flow.zero_flow import UNKNOWN
@@ -73,7 +74,7 @@ def run_scene(rig: ScenarioRig, scene: str, variant: str, rng: np.random.Generat
             totals[rule].update(counts)
         still = answers.side != 0.0
         asked += int(np.count_nonzero(still))
-        unknown += int(np.count_nonzero(still & ~look.percept.zfc.supported))
+        unknown += int(np.count_nonzero(still & ~answering_pixels(look.percept.zfc, look.image)))
         moving += int(np.count_nonzero(still & look.percept.zfc.moving))
     objects = [
         _described(obstacle, record, instance, index)

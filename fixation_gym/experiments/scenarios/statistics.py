@@ -25,10 +25,21 @@ MEASURES = {
     "image_behind": ("image_behind", "image"),
     "inner_image_behind": ("inner_image_behind", "inner_image"),
     "obstacle_share": ("on_obstacle", "asked"),
+    "evidence_obstacle_sign_accuracy": ("evidence_obstacle_right", "evidence_obstacle"),
+    "evidence_surface_sign_accuracy": ("evidence_surface_right", "evidence_surface"),
+    "obstacle_evidence": ("evidence_obstacle", "obstacle_pixels"),
+    "obstacle_answering": ("on_obstacle", "obstacle_pixels"),
+    "front_evidence_found": ("evidence_front_obstacle_called", "front_obstacle"),
+    "front_found": ("front_obstacle_called", "front_obstacle"),
+    "thin_evidence_found": ("evidence_thin_called", "thin"),
+    "thin_found": ("thin_called", "thin"),
     **{f"{name}_called_front": (f"front_{name}_called", f"front_{name}") for name in SURFACES},
 }
-"""Ratios of pixel counts summed over the instances; pixels without evidence do not count. ``surface``: of obstacles,
-but for images in mirrors. ``called_front``: of the pixels of a surface in front, whatever is seen in it."""
+"""Ratios of pixel counts summed over the instances; only pixels that answer count. ``surface``: of obstacles, but for
+images in mirrors. ``evidence``: at all pixels with evidence. ``obstacle_evidence``, ``obstacle_answering``: share of
+all pixels of obstacles that have evidence or answer. ``found``: share of all pixels of obstacles in front, or of thin
+parts of them, that are called in front. ``called_front``: of the pixels with evidence of a surface in front, whatever
+is seen in it."""
 FIRST_CALL_S = 0.5
 _RESAMPLES = 1000
 ALL = "all"
@@ -174,6 +185,8 @@ _COLUMNS = {
     "surface": "surface_sign_accuracy",
     "inner": "inner_sign_accuracy",
     "inner obs": "inner_obstacle_sign_accuracy",
+    "evidence": "evidence_obstacle_sign_accuracy",
+    "answering": "obstacle_answering",
     "recall": "front_recall",
     "precision": "front_precision",
     "images": "inner_image_behind",
