@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Aligned, any_pair_meets, may_meet, meets, part_of, scratch, sphere_around
+from fixation_gym.control.box_tests import Aligned, any_pair_meets, may_meet, meets, part_of, sphere_around
 from fixation_gym.envs.drafts import Drafts, Indices
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray, MaskArray
@@ -33,10 +33,10 @@ def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Al
         smaller: what a hand sweeps that is smaller than the real one.
         quota: how many ways may stay open.
     """
-    room, sizes = scratch(), np.sum(quota.groups, axis=1)
+    sizes = np.sum(quota.groups, axis=1)
     counts = np.zeros(len(sizes), np.int64)
     for way in range(len(hands)):
-        if meets(target, hands[way], drafts.boxes, smaller, room):
+        if meets(target, hands[way], drafts.boxes, smaller):
             continue
         for group in range(len(sizes)):
             counts[group] += quota.groups[group, way]
@@ -48,13 +48,13 @@ def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Al
 @njit(cache=True)
 def barred_ways(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Aligned) -> MaskArray:
     """Ways that each of n drafts bars, shape (n, ways); arguments as above."""
-    barred, room = np.zeros((len(drafts.kinds), len(hands)), np.bool_), scratch()
+    barred = np.zeros((len(drafts.kinds), len(hands)), np.bool_)
     for index in range(len(drafts.kinds)):
         boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
         middle, radius = sphere_around(boxes)
         for way in range(len(hands)):
-            if may_meet(target, hands[way], middle, radius, smaller, room):
-                barred[index, way] = meets(target, hands[way], boxes, smaller, room)
+            if may_meet(target, hands[way], middle, radius, smaller):
+                barred[index, way] = meets(target, hands[way], boxes, smaller)
     return barred
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Aligned, any_pair_meets, meets, scratch
+from fixation_gym.control.box_tests import Aligned, any_pair_meets, meets
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray
 
@@ -48,7 +48,7 @@ def steps_to_room(boxes: BoxSet, step: FloatArray, most: int, room: Room) -> int
         most: largest number of steps.
         room: what it must keep clear of.
     """
-    rest, latest, ways = scratch(), 0, len(room.ways)
+    latest, ways = 0, len(room.ways)
     moved = BoxSet(boxes.centres.copy(), boxes.rotations, boxes.halves)
     for count in range(most + 1):
         for i in range(len(boxes.centres)):
@@ -58,7 +58,7 @@ def steps_to_room(boxes: BoxSet, step: FloatArray, most: int, room: Room) -> int
         for pair in range(len(room.ends) * ways):
             # What was met a step ago is probably met once more.
             way = (latest + pair) % (len(room.ends) * ways)
-            if meets(room.ends[way // ways], room.ways[way % ways], moved, room.swept, rest):
+            if meets(room.ends[way // ways], room.ways[way % ways], moved, room.swept):
                 met = way
                 break
             if pair == 0 and not _is_clear(moved, room):

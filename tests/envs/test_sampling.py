@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fixation_gym.control.box_tests import any_meets, boxes_meet, meets, scratch
+from fixation_gym.control.box_tests import any_meets, boxes_meet, meets
 from fixation_gym.control.corridor import free_directions, hand_axes, hand_boxes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import SCENARIOS, Scenario
@@ -94,12 +94,12 @@ def test_the_free_way_is_anywhere_in_the_reach():
 @pytest.mark.parametrize("name", CROWDED)
 def test_no_habit_is_worth_having(name):
     """A way counts as open unless a hand that is 1 cm smaller, and has no wrist, would touch something on it."""
-    smaller, room, found = swept_hand(-0.01, wrist=False), scratch(), scenes(name, 16)
+    smaller, found = swept_hand(-0.01, wrist=False), scenes(name, 16)
     opened = np.zeros(len(REACH_GRID), int)
     for scene in found:
         end = scene.target.places[-1]
         boxes = still_boxes(scene)
-        opened += [not meets(end, hand, boxes, smaller, room) for hand in hand_axes(reachable_directions(end))]
+        opened += [not meets(end, hand, boxes, smaller) for hand in hand_axes(reachable_directions(end))]
     assert opened.max() <= 12, f"way {np.degrees(REACH_GRID[opened.argmax()])} is open in {opened.max()} of 16 scenes"
 
 
