@@ -77,7 +77,7 @@ core full:  # install what demo needs, or everything
 lock: full  # write constraints.txt
 	cp constraints.txt constraints.tmp || true
 	sed -n 's/^TORCH_VERSION=/torch==/p' scripts/bootstrap.sh | $(VENV)/uv pip compile pyproject.toml --constraint - \
-	    --universal --python-version 3.10 --extra rl --extra export --extra ros --extra viz --extra photoreal --extra cluster --extra bench --extra docs --extra dev --no-emit-package setuptools \
+	    --universal --python-version 3.10 --extra rl --extra export --extra ros --extra fetch --extra viz --extra photoreal --extra cluster --extra bench --extra docs --extra dev --no-emit-package setuptools \
 	    --no-annotate --no-header --quiet --output-file constraints.tmp >/dev/null
 	{ echo "# All versions, for Python 3.10 to 3.12 and every extra. Regenerate with: make lock"; \
 	  grep -v -e "'never'" -e '^#' constraints.tmp; } >constraints.txt

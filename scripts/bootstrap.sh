@@ -89,7 +89,7 @@ install_packages() {
     touch .venv/.installing
     $python -m pip install --quiet "uv==$UV_VERSION" >&2
     if [[ "$TIER" == full ]]; then
-        extras="[rl,export,ros,photoreal,cluster,dev]"
+        extras="[rl,export,ros,fetch,photoreal,cluster,dev]"
         # pip first, because it takes a CPU build of torch where one is configured (PIP_EXTRA_INDEX_URL, PIP_FIND_LINKS);
         # uv then keeps what it finds.
         say "installing torch $TORCH_VERSION (the CUDA build is large)"

@@ -12,6 +12,7 @@ from fixation_gym.recordings.bag import read_bag
 from fixation_gym.recordings.layout import FRAMES_FILE, read_layout
 from fixation_gym.recordings.npz import read_npz
 from fixation_gym.recordings.options import ReaderOptions
+from fixation_gym.recordings.public import PUBLIC
 from fixation_gym.recordings.recording import RECORDING_METHODS, Recording
 from fixation_gym.recordings.seven_scenes import PICTURES, read_seven_scenes
 from fixation_gym.recordings.tum import RGB_FILE, read_tum
@@ -81,7 +82,7 @@ def open_recording(path: Path, options: ReaderOptions | None = None, reader: str
         recording = load_class(reader, _OPTION, RECORDING_METHODS)(path)
     else:
         if not path.exists():
-            raise UsageError(f"there is no recording {path}")
+            raise UsageError(f"there is no recording {path}; public ones can be named: {', '.join(PUBLIC)}")
         name = reader or _fitting(path)
         _check_taken(name, options)
         recording = READERS[name].read(path, options)

@@ -22,7 +22,10 @@ class ReplayConfig(ReaderOptions):
     """Which recording, and which thing in it."""
 
     recording: tyro.conf.Positional[Path]
-    """Folder or file: the project's own layout, TUM RGB-D, 7-Scenes, a video, an .npz, a ROS bag."""
+    """Folder or file: the project's own layout, TUM RGB-D, 7-Scenes, a video, an .npz, a ROS bag. Or the name of a
+    public recording, which is downloaded once."""
+    data: Path | None = None
+    """Folder that has the recording, where there is no network; nothing is downloaded then."""
     reader: str | None = None
     """layout, tum, 7scenes, npz, video, bag, or module:Class of your own; by default by what is there."""
     target: str | None = None
@@ -61,6 +64,8 @@ class ReplayConfig(ReaderOptions):
         given = {name: value for name, value in paths.items() if value is not None}
         own = {"target": self.target, "detector": self.detector, "estimator": self.estimator}
         own |= {"pose_noise": list(self.pose_noise)}
+        if self.data is not None:
+            own |= {"data": str(self.data)}
         return {"recording": str(self.recording), **own, **given}
 
 

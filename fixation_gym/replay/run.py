@@ -26,6 +26,7 @@ from fixation_gym.perception.pipeline import Perception
 from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.perception.zero_flow.answering_pixels import answering_pixels
 from fixation_gym.recordings.catalogue import open_recording
+from fixation_gym.recordings.public import located
 from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.recordings.stamps import OrderedFrames, in_order
 from fixation_gym.replay.alarms import alarms_on, calibration_summary
@@ -61,7 +62,7 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
             those before it first.
     """
     started = time.monotonic()
-    recording = open_recording(config.recording, config, config.reader)
+    recording = open_recording(located(config.recording, config.data), config, config.reader)
     camera, pictures = recording.camera, len(recording)
     first = next(iter(recording))
     ordered = in_order(recording, str(config.recording))
