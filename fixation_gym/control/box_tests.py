@@ -98,7 +98,7 @@ def may_meet(target: FloatArray, axes: FloatArray, middle: FloatArray, radius: f
 @njit(cache=True)
 def any_pair_meets(first: BoxSet, second: BoxSet, gap: float) -> bool:
     """Whether a box of one set comes nearer than about ``gap`` m to one of the other."""
-    for i in range(len(first.centres)):
+    for i in range(len(first.centres)):  # noqa: SIM110 (numba knows no generators)
         if _one_meets(first, i, second, gap):
             return True
     return False

@@ -24,6 +24,9 @@ class Scratch:
         """Start empty; arrays are made when first asked for."""
         self._arrays: dict[tuple[str, tuple[int, ...]], Float32Array] = {}
 
+    def __reduce__(self) -> tuple[type[Scratch], tuple[()]]:
+        return Scratch, ()  # nothing in it is worth a copy
+
     def get(self, name: str, *shape: int) -> Float32Array:
         """Return a float32 array with undefined content."""
         array = self._arrays.get((name, shape))

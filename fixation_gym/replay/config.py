@@ -12,6 +12,7 @@ import tyro
 
 from fixation_gym.errors import UsageError
 from fixation_gym.recordings.options import ReaderOptions
+from fixation_gym.strangers import is_class_name
 
 Pixel = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -56,6 +57,11 @@ class ReplayConfig(ReaderOptions):
             raise UsageError(f"--pose-noise must be two numbers above 0, mm and deg, got {self.pose_noise}")
         if self.rerun is not None and importlib.util.find_spec("rerun") is None:
             raise UsageError("--rerun needs rerun-sdk: pip install 'fixation-gym[viz]'")
+
+    @property
+    def resumes(self) -> bool:
+        """Whether a killed replay goes on: a file for Rerun cannot, and nobody knows what another detector keeps."""
+        return self.rerun is None and not is_class_name(self.detector or "")
 
     def run_description(self) -> dict[str, Any]:
         """What the estimates depend on."""

@@ -23,6 +23,8 @@ from fixation_gym.types import FloatArray, ImageArray, MaskArray, Observation
 class Truth:
     """What is true of one frame, as the pinhole sees it."""
 
+    rgb: ImageArray
+    """Its picture, shape (H, W, 3)."""
     distance_m: float | None
     """Depth of the target: as the recording says it, or the median of its depth over its mask, or over what the
     detector found."""
@@ -47,8 +49,6 @@ class Look:
     truth: Truth
     map_truth: Truth | None
     """Of the frame that flow and map belong to, which is the one before; None for the first frame."""
-    map_rgb: ImageArray | None
-    """Picture of that frame, shape (H, W, 3)."""
     perception_s: float
     """Time that perception took, s."""
 
@@ -87,22 +87,25 @@ class Straightener:
 
 
 def looks(
-    frames: Iterable[RecordedFrame], perception: Perception, target: Target, straightener: Straightener
+    frames: Iterable[RecordedFrame],
+    perception: Perception,
+    target: Target,
+    straightener: Straightener,
+    before: Truth | None = None,
 ) -> Iterator[Look]:
     """Perceive frames one after the other.
 
     Args:
         frames: in order, each with a pose.
-        perception: of the pinhole; it was reset.
+        perception: of the pinhole; it was reset, or has seen the frames before.
         target: whose detector it has.
         straightener: of the camera.
+        before: of the frame before the first; None: there is none.
 
     Raises:
         UsageError: if a frame's file cannot be read.
     """
     box = straightener.box(target.box)
-    before: Truth | None = None
-    rgb_before: ImageArray | None = None
     for frame in frames:
         assert frame.camera_pose is not None
         rgb, mask = straightener.image(frame.image()), straightener.mask(frame)
@@ -110,14 +113,16 @@ def looks(
         started = time.perf_counter()
         percept = perception.update(Observation.of_camera(frame.time, rgb, frame.camera_pose, box, given))
         took = time.perf_counter() - started
-        truth = _truth(frame, mask, straightener.depth(frame), percept)
-        yield Look(frame.name, rgb, frame.camera_pose, percept, truth, before, rgb_before, took)
-        before, rgb_before = truth, rgb
+        truth = _truth(frame, rgb, mask, straightener.depth(frame), percept)
+        yield Look(frame.name, rgb, frame.camera_pose, percept, truth, before, took)
+        before = truth
 
 
-def _truth(frame: RecordedFrame, mask: MaskArray | None, depth: Float32Array | None, percept: Percept) -> Truth:
+def _truth(
+    frame: RecordedFrame, rgb: ImageArray, mask: MaskArray | None, depth: Float32Array | None, percept: Percept
+) -> Truth:
     target = percept.segmentation.mask if mask is None else mask
     distance = frame.distance_true_m
     if distance is None and depth is not None:
         distance = depth_over(target, depth)
-    return Truth(distance, depth, mask, target)
+    return Truth(rgb, distance, depth, mask, target)

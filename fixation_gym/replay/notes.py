@@ -44,6 +44,8 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         f"{summary['perceived']} of {summary['pictures']} pictures, target found by {summary['found_by']}, "
         f"{summary['perception_ms']:.1f} ms of perception per picture"
     ]
+    if summary["pictures_resumed"]:
+        lines.append(f"{_pictures(summary['pictures_resumed'])} of these by the run before, which was killed")
     distance, map_, mask = (summary[name] for name in ("distance", "map", "mask"))
     if distance is not None and distance["frames"]:
         lines.append(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 _MAY_DIFFER = ("wall_s", "wall_ms", "seconds", "perception_ms", "folder", "recording")
-_MAY_DIFFER += ("episodes_resumed", "sequences_resumed", "runs_resumed")
+_MAY_DIFFER += ("episodes_resumed", "sequences_resumed", "runs_resumed", "pictures_resumed")
 _NOT_REPEATABLE = ("tensorboard", "checkpoint-")
 """Training goes on from its last checkpoint with other scenes: what it learned differs, how far it came does not."""
 _TRAINED = ("best.zip", "cells.jsonl")
