@@ -30,12 +30,12 @@ _FARTHEST_JITTER = 0.45
 
 
 def intrinsics_of(image_size: tuple[int, int], noise: SensorNoise) -> Intrinsics:
-    """The wrist camera with its lens, for pictures of (height, width) px.
+    """The wrist camera with its lens and shutter, for pictures of (height, width) px.
 
     Raises:
         ValueError: if the lens bends the border of the picture too far.
     """
-    pinhole = Intrinsics.from_fovy(*image_size, ROBOT.camera.fovy)
+    pinhole = replace(Intrinsics.from_fovy(*image_size, ROBOT.camera.fovy), readout_s=noise.readout_s)
     if not noise.lens:
         return pinhole
     camera = replace(pinhole, lens=Lens(noise.lens))

@@ -55,6 +55,8 @@ class Intrinsics:
     cy: float
     lens: Lens | None = None
     """None: pictures are those of a pinhole."""
+    readout_s: float = 0.0
+    """Time from the exposure of the first row to that of the last, s: a rolling shutter. 0: all rows at once."""
 
     def __post_init__(self) -> None:
         sizes = (self.height, self.width)
@@ -64,6 +66,8 @@ class Intrinsics:
             raise ValueError(f"focal lengths must be positive and finite, got {self.fx} and {self.fy}")
         if not all(isinstance(centre, Real) and math.isfinite(centre) for centre in (self.cx, self.cy)):
             raise ValueError(f"the principal point must be finite, got {self.cx} and {self.cy}")
+        if not (isinstance(self.readout_s, Real) and 0.0 <= self.readout_s < math.inf):
+            raise ValueError(f"readout_s must be 0 or above, and finite, got {self.readout_s}")
 
     @classmethod
     def from_fovy(cls, height: int, width: int, fovy_rad: float) -> Intrinsics:
@@ -138,4 +142,4 @@ def _scaled(camera: Intrinsics, height: int, width: int) -> Intrinsics:
     sx, sy = width / camera.width, height / camera.height
     cx = (camera.cx + 0.5) * sx - 0.5
     cy = (camera.cy + 0.5) * sy - 0.5
-    return Intrinsics(width, height, camera.fx * sx, camera.fy * sy, cx, cy, camera.lens)
+    return Intrinsics(width, height, camera.fx * sx, camera.fy * sy, cx, cy, camera.lens, camera.readout_s)

@@ -30,6 +30,7 @@ from fixation_gym.perception.flow.optic_flow import (
     plane_homography,
     prepare_grey,
 )
+from fixation_gym.perception.flow.rolling_shutter import row_maps
 from fixation_gym.perception.pairing import PoseHistory, at_the_picture, carried
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.rectification import Rectification, in_colour
@@ -213,14 +214,19 @@ class Perception:
             fixated, _ = inverse_distance(self._estimator, middle.T_base_cam)
         outer = (inverse(frame.T_base_cam) @ middle.T_base_cam for frame in (first, last))
         to_first, to_last = (plane_homography(T, fixated, self._working) for T in outer)
+        times = [frame.time for frame in self._frames]
+        rolling = None
+        if self._working.readout_s > 0.0:
+            rolling = row_maps([frame.T_base_cam for frame in self._frames], times, fixated, self._working)
         return estimate_flow(
             [frame.grey for frame in self._frames],
-            [frame.time for frame in self._frames],
+            times,
             self._working,
             (to_first, to_last),
             fixated,
             self._settings.flow,
             self._scratch,
+            rolling,
         )
 
     def _look_for_obstacles(self, flow: Flow) -> ZeroFlow:

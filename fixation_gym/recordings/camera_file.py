@@ -41,10 +41,13 @@ def read_camera(path: Path) -> Intrinsics:
         value = values.get(key)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             raise UsageError(f"{path} needs a number as '{key}', got {value!r}")
+    readout_s = values.get("readout_s", 0.0)
+    if isinstance(readout_s, bool) or not isinstance(readout_s, (int, float)):
+        raise UsageError(f"{path} needs a number as 'readout_s', got {readout_s!r}")
     lens = _lens(path, values.get("distortion", []), values.get("distortion_model", LENS_MODELS[0]))
     try:
         fx, fy, cx, cy = (float(values[key]) for key in _NUMBERS)
-        return Intrinsics(int(values["width"]), int(values["height"]), fx, fy, cx, cy, lens)
+        return Intrinsics(int(values["width"]), int(values["height"]), fx, fy, cx, cy, lens, float(readout_s))
     except ValueError as error:
         raise UsageError(f"{path}: {error}") from error
 
@@ -79,4 +82,5 @@ def camera_values(camera: Intrinsics) -> dict[str, Any]:
         **{key: getattr(camera, key) for key in _NUMBERS},
         "distortion": [] if lens is None else list(lens.coefficients),
         "distortion_model": LENS_MODELS[0] if lens is None else lens.model,
+        "readout_s": camera.readout_s,
     }

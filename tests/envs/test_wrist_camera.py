@@ -13,7 +13,7 @@ from fixation_gym.envs.development import developed
 from fixation_gym.envs.lens import bent_box, through_lens, wide_pinhole
 from fixation_gym.envs.sensor_noise import SENSOR_NOISE, SensorNoise
 from fixation_gym.envs.shutter import exposed_rows, row_weights
-from fixation_gym.envs.wrist_camera import exposed, moved_on, switched_on
+from fixation_gym.envs.wrist_camera import exposed, intrinsics_of, moved_on, switched_on
 from fixation_gym.geometry.camera import Intrinsics, Lens
 from fixation_gym.perception.rectification import Rectification
 
@@ -35,6 +35,12 @@ def running(noise, periods, seed=0):
 def ramp(qpos):
     """A picture whose grey level is 1000 times the coordinate."""
     return np.full((41, 8, 3), np.clip(1000.0 * qpos[0], 0, 255), np.float64)
+
+
+def test_who_observes_knows_the_shutter():
+    assert intrinsics_of((24, 32), SENSOR_NOISE["nominal"]).readout_s == 0.0
+    assert intrinsics_of((24, 32), SensorNoise(readout_s=0.03, delay_s=0.015)).readout_s == 0.03
+    assert intrinsics_of((24, 32), SENSOR_NOISE["realistic"]).readout_s == SENSOR_NOISE["realistic"].readout_s > 0.0
 
 
 def test_a_camera_without_a_clock_takes_a_picture_at_every_step():

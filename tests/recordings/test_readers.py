@@ -28,6 +28,7 @@ from made_recordings import (
 from fixation_gym.errors import UsageError
 from fixation_gym.geometry.camera import Lens
 from fixation_gym.geometry.rigid import pose_to_matrix
+from fixation_gym.recordings.camera_file import camera_values, read_camera
 from fixation_gym.recordings.catalogue import open_recording
 from fixation_gym.recordings.options import ReaderOptions
 
@@ -110,6 +111,14 @@ def test_the_lens_of_the_camera_file_is_read(tmp_path):
     folder = write_layout(tmp_path / "a", made_frames()[:1])
     write_camera(folder / "camera.json", distortion=[0.1, 0.0, 0.0, 0.0], distortion_model="fisheye")
     assert open_recording(folder).camera.lens == Lens((0.1, 0.0, 0.0, 0.0), "fisheye")
+
+
+def test_the_shutter_of_the_camera_file_is_read_and_written(tmp_path):
+    path = write_camera(tmp_path / "camera.json", readout_s=0.03)
+    assert read_camera(path).readout_s == camera_values(read_camera(path))["readout_s"] == 0.03
+    for wrong in (-1.0, "soon", True, None):
+        with pytest.raises(UsageError, match=r"camera\.json.*readout_s"):
+            read_camera(write_camera(tmp_path / "camera.json", readout_s=wrong))
 
 
 def test_grey_pictures_are_read(tmp_path):

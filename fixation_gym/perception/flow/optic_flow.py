@@ -28,6 +28,7 @@ from fixation_gym.perception.flow.gradients import (
 )
 from fixation_gym.perception.flow.kernels import WINDOW
 from fixation_gym.perception.flow.picture_noise import take_own_noise
+from fixation_gym.perception.flow.rolling_shutter import PixelMap
 from fixation_gym.perception.scratch import Float32Array, Scratch, fill
 from fixation_gym.types import FloatArray, ImageArray, MaskArray
 
@@ -134,6 +135,7 @@ def estimate_flow(
     warp_inverse_depth: float = 0.0,
     settings: FlowSettings | None = None,
     scratch: Scratch | None = None,
+    row_maps: tuple[PixelMap, PixelMap] | None = None,
 ) -> Flow:
     """Estimate the flow at the middle one of three frames.
 
@@ -146,10 +148,12 @@ def estimate_flow(
         warp_inverse_depth: d of the plane in ``homographies``, only recorded.
         settings: resolutions and noise; None for the defaults.
         scratch: work arrays to reuse from frame to frame, which is about twice as fast; None for new ones.
+        row_maps: of a rolling shutter, in place of ``homographies``, which then say what all rows at once would have
+            shown; see ``rolling_shutter``. The residual is of every row's own camera.
     """
     settings, scratch = settings or _DEFAULTS, scratch or Scratch()
     smooth, change = scratch.get("filtered in time", 2, *frames[1].shape)
-    seen = _warped(frames, homographies, scratch)
+    seen = _warped(frames, row_maps or homographies, scratch)
     gains = relative_gain(seen[1], seen[0]), relative_gain(seen[1], seen[2])
     _filter_in_time((without_gain(seen[0], gains[0]), seen[1], without_gain(seen[2], gains[1])), smooth, change)
     dark = is_dark(seen[1])
@@ -177,16 +181,21 @@ def estimate_flow(
 
 
 def _warped(
-    frames: Sequence[Float32Array], homographies: tuple[FloatArray, FloatArray] | None, scratch: Scratch
+    frames: Sequence[Float32Array],
+    maps: tuple[FloatArray, FloatArray] | tuple[PixelMap, PixelMap] | None,
+    scratch: Scratch,
 ) -> tuple[Float32Array, Float32Array, Float32Array]:
     """The frames as seen from the middle one, each of shape (H, W)."""
     first, middle, last = frames
     height, width = middle.shape
-    if homographies is not None:
+    if maps is not None:
         warped = scratch.get("warped", 2, height, width)
         flags, border = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, cv2.BORDER_REPLICATE
-        for frame, homography, out in zip((first, last), homographies, warped, strict=True):
-            cv2.warpPerspective(frame, homography, (width, height), dst=out, flags=flags, borderMode=border)
+        for frame, to_frame, out in zip((first, last), maps, warped, strict=True):
+            if isinstance(to_frame, tuple):
+                cv2.remap(frame, *to_frame, cv2.INTER_LINEAR, dst=out, borderMode=border)
+            else:
+                cv2.warpPerspective(frame, to_frame, (width, height), dst=out, flags=flags, borderMode=border)
         first, last = warped
     return first, middle, last
 
