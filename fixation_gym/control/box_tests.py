@@ -151,7 +151,7 @@ def sphere_around(boxes: BoxSet) -> tuple[FloatArray, float]:
 
 @njit(cache=True)
 def _row(array: FloatArray, i: int) -> Triple:
-    """A row of an array, (n, 3). Compiled code keeps three numbers in registers, but counts the users of an array."""
+    """A row of an array, (n, 3), as plain numbers."""
     return array[i, 0], array[i, 1], array[i, 2]
 
 
@@ -203,8 +203,6 @@ def _is_outside(place: Triple, low: FloatArray, high: FloatArray, margin: float)
 @njit(cache=True)
 def _meets_aligned(offset: Triple, rotation: tuple[Triple, Triple, Triple], half: Triple, aligned: Triple) -> bool:
     """Whether a turned box meets an aligned one at the origin (separating axes, Gottschalk).
-
-    The axes are written out: with loops over them a test takes a quarter longer.
 
     Args:
         offset: where the turned box is, m.
