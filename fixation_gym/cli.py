@@ -149,8 +149,10 @@ class Bench:
 
     quick: bool = False
     """Fewer rounds, without worker processes and memory run."""
+    growth: bool = False
+    """In place of that: how costs grow with image, obstacles, episode and workers, and what a first use takes."""
     out: Path = Path("out/bench")
-    """Folder of the results; earlier ones there are replaced."""
+    """Folder of the results; earlier ones of the same kind are replaced."""
 
     def run(self) -> int:
         """Measure and print the table."""
@@ -158,10 +160,16 @@ class Bench:
         from fixation_gym.evaluation.storage import make_folder
 
         make_folder(self.out)
-        from fixation_gym.experiments.bench.run import FIGURE_FILE, bench, format_table
+        if self.growth:
+            from fixation_gym.experiments.bench.growth import GROWTH_FIGURE, format_growth, growth
 
-        print(format_table(bench(self.quick, self.out)))
-        print(f"\n{self.out / FIGURE_FILE}")
+            print(format_growth(growth(self.quick, self.out)))
+            print(f"\n{self.out / GROWTH_FIGURE}")
+        else:
+            from fixation_gym.experiments.bench.run import FIGURE_FILE, bench, format_table
+
+            print(format_table(bench(self.quick, self.out)))
+            print(f"\n{self.out / FIGURE_FILE}")
         return 0
 
 

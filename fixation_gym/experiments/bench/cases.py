@@ -27,7 +27,8 @@ Size = tuple[int, int]
 STEP_SIZES: tuple[Size, ...] = ((84, 84), (128, 128), (240, 320), (480, 640))
 PERCEPTION_SIZES: tuple[Size, ...] = ((128, 128), (240, 320), (480, 640))
 _FRAMES = 30
-_ENDLESS = 10**9
+ENDLESS = 10**9
+"""Steps of an episode that does not end."""
 
 
 def all_groups() -> list[Callable[[], Iterator[Case]]]:
@@ -49,10 +50,10 @@ def environment_cases() -> Iterator[Case]:
     """Step and reset of ``FixationPick-v0`` in scenario ``opaque``."""
     sizes: list[Size | None] = [None, *STEP_SIZES]
     for size in sizes:
-        env = gym.make("FixationPick-v0", scenario="opaque", image_size=size, max_episode_steps=_ENDLESS)
+        env = gym.make("FixationPick-v0", scenario="opaque", image_size=size, max_episode_steps=ENDLESS)
         env.reset(seed=0)
         suffix = "without image" if size is None else label(size)
-        yield Case(f"step {suffix}", _stepper(env), env.close)
+        yield Case(f"step {suffix}", stepper(env), env.close)
         if size in (None, (128, 128)):
             yield Case(f"reset {suffix}", env.reset)
 
@@ -65,10 +66,10 @@ def learner_cases() -> Iterator[Case]:
             scenario="opaque",
             image_size=(128, 128),
             observation=observation,
-            max_episode_steps=_ENDLESS,
+            max_episode_steps=ENDLESS,
         )
         env.reset(seed=0)
-        yield Case(f"step 128x128 {observation}", _stepper(env), env.close)
+        yield Case(f"step 128x128 {observation}", stepper(env), env.close)
 
 
 def perception_cases() -> Iterator[Case]:
@@ -76,7 +77,7 @@ def perception_cases() -> Iterator[Case]:
     for size in PERCEPTION_SIZES:
         recorded = record_approach(size)
         observations = [Observation.from_dict(observation) for observation in recorded]
-        yield Case(f"perception {label(size)}", _replay(_perception(size), observations))
+        yield Case(f"perception {label(size)}", _replay(make_perception(size), observations))
         for name, run in stages(_camera(size), observations):
             yield Case(f"{name} {label(size)}", run)
         yield Case(f"ServoPolicy.act {label(size)}", _act(size, recorded))
@@ -90,7 +91,7 @@ def record_approach(size: Size) -> list[dict[str, Any]]:
     """Observations of the environment in the servo's first second of one ``opaque`` scene."""
     env = gym.make("FixationPick-v0", scenario="opaque", image_size=size)
     observation, _ = env.reset(seed=0)
-    policy = ServoPolicy(_perception(size))
+    policy = ServoPolicy(make_perception(size))
     policy.reset(0)
     recorded = []
     for _ in range(_FRAMES):
@@ -149,17 +150,17 @@ def panda_gym_image_cases() -> Iterator[Case]:
 
 def _gymnasium_cases(name: str, env_id: str) -> Iterator[Case]:
     """Step and reset."""
-    env = gym.make(env_id, max_episode_steps=_ENDLESS)
+    env = gym.make(env_id, max_episode_steps=ENDLESS)
     env.reset(seed=0)
-    yield Case(f"{name} step", _stepper(env), env.close)
+    yield Case(f"{name} step", stepper(env), env.close)
     yield Case(f"{name} reset", lambda: env.reset() and None)
 
 
 def _gymnasium_image_cases(name: str, env_id: str, size: dict[str, Any]) -> Iterator[Case]:
     """A step followed by an image."""
-    env = gym.make(env_id, max_episode_steps=_ENDLESS, render_mode="rgb_array", **size)
+    env = gym.make(env_id, max_episode_steps=ENDLESS, render_mode="rgb_array", **size)
     env.reset(seed=0)
-    step = _stepper(env)
+    step = stepper(env)
 
     def run() -> Any:
         step()
@@ -168,7 +169,7 @@ def _gymnasium_image_cases(name: str, env_id: str, size: dict[str, Any]) -> Iter
     yield Case(f"{name} step 128x128", run, env.close)
 
 
-def _stepper(env: gym.Env[Any, Any]) -> Callable[[], Any]:
+def stepper(env: gym.Env[Any, Any]) -> Callable[[], Any]:
     """Step with a slow cyclic action; returns the wrist image if the observation has one."""
     shape = env.action_space.shape or (1,)
     count = 0
@@ -199,7 +200,7 @@ def _replay(perception: Perception, observations: list[Observation]) -> Callable
 
 
 def _act(size: Size, recorded: list[dict[str, Any]]) -> Callable[[], Any]:
-    policy = ServoPolicy(_perception(size))
+    policy = ServoPolicy(make_perception(size))
     index = 0
 
     def run() -> None:
@@ -232,5 +233,6 @@ def _camera(size: Size) -> Intrinsics:
     return Intrinsics.from_fovy(*size, ROBOT.camera.fovy)
 
 
-def _perception(size: Size) -> Perception:
+def make_perception(size: Size) -> Perception:
+    """Perception of the wrist camera with images of that size."""
     return Perception(_camera(size), support_height_m=ROBOT.workspace.table_height)
