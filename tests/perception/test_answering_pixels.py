@@ -47,7 +47,7 @@ def test_only_pixels_with_evidence_answer_and_not_those_whose_depth_may_be_on_ei
 def test_behind_beside_surely_in_front_does_not_answer_but_in_front_does():
     nearness = np.full((30, 40), -0.5)
     nearness[:, 20:] = 0.5
-    np.testing.assert_array_equal(answering_pixels(evidence(nearness), GREY)[0], ~np.isin(np.arange(40), (17, 18, 19)))
+    np.testing.assert_array_equal(answering_pixels(evidence(nearness), GREY)[0], ~np.isin(np.arange(40), range(14, 20)))
     nearness[:, 20:] = 0.03  # in front, but not surely: it silences nobody
     assert answering_pixels(evidence(nearness), GREY).all()
 
@@ -101,7 +101,7 @@ def test_pixels_that_answer_are_right_more_often_than_those_with_evidence():
         right = (zfc.inverse_depth > zfc.fixated_inverse_depth) == (relative < 1.0)
     answering = answering_pixels(zfc, picture)
     assert not (answering & ~zfc.supported).any()
-    assert answering.sum() > 0.85 * zfc.supported.sum()
+    assert answering.sum() > 0.75 * zfc.supported.sum()
     wrong = [(asked & mask & ~right).sum() / (asked & mask).sum() for mask in (zfc.supported, answering)]
     assert wrong[1] < 0.7 * wrong[0]
 

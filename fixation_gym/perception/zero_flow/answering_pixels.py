@@ -30,8 +30,9 @@ class AnswerSettings:
     """A side is decided if the depth is off the fixated one by so many standard deviations."""
     surely_stds: float = 2.0
     """Something is surely in front if it is nearer than the fixated object by so many."""
-    reach_px: int = 3
-    """Reach of a window beyond its centre, px of the flow grid."""
+    reach_px: int = 6
+    """Reach of a window beyond its centre at the second finest resolution, px of the flow grid; it is 3 at the finest
+    and 12 at the coarsest, where hardly any pixel takes its motion from."""
     white: float = 250.0
     """From this mean grey level on a pixel of the flow grid is overexposed."""
     filter_px: int = 1
