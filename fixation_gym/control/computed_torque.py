@@ -1,6 +1,7 @@
 """Torques that make the arm follow a camera twist: computed torque on the joint velocities of the twist.
 
-Compiled: it runs at every physics substep, on views into the simulator's arrays.
+Compiled: it runs at every physics substep, on views into the simulator's arrays. Loops fill arrays element by element:
+numba takes seconds to compile the assignment of an array to a part of another one.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.resolved_rate import JointLimits, joint_velocities
+from fixation_gym.control.resolved_rate import DAMPING, LIMIT_GAIN, POSTURE_GAIN, JointLimits, joint_velocities
 from fixation_gym.types import FloatArray
 
 _VELOCITY_GAIN, _POSITION_GAIN = 40.0, 400.0
@@ -59,16 +60,16 @@ def camera_kinematics(arm: ArmDynamics, hand_eye: FloatArray) -> tuple[FloatArra
     """Camera pose T_world_cam, shape (4, 4), and its twist, expressed in ``cam``, per joint velocity, shape (6, n)."""
     pose = np.zeros((4, 4))
     pose[3, 3] = 1.0
-    pose[:3, 3] = arm.hand_position
     for i in range(3):
+        pose[i, 3] = arm.hand_position[i]
         for k in range(3):
             for j in range(4):
                 pose[i, j] += arm.hand_rotation[i, k] * hand_eye[k, j]
     joints = len(arm.joint_pos)
     jacobian = np.empty((6, joints))
     for k in range(joints):
-        ax, ay, az = arm.axes[k]
-        rx, ry, rz = pose[:3, 3] - arm.anchors[k]
+        ax, ay, az = arm.axes[k, 0], arm.axes[k, 1], arm.axes[k, 2]
+        rx, ry, rz = pose[0, 3] - arm.anchors[k, 0], pose[1, 3] - arm.anchors[k, 1], pose[2, 3] - arm.anchors[k, 2]
         vx, vy, vz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
         for i in range(3):
             cx, cy, cz = pose[0, i], pose[1, i], pose[2, i]
@@ -89,8 +90,11 @@ def arm_torques(arm: ArmDynamics, task: ArmTask, twist: FloatArray, command: Flo
         torques: the result, shape (n,), N m.
     """
     _, jacobian = camera_kinematics(arm, task.hand_eye)
-    posture, lower, upper, speed, least, most = task.joints
-    velocity = joint_velocities(jacobian, twist, arm.joint_pos, posture, JointLimits(lower, upper, speed))
+    # The types are those that other callers have, or numba would compile once more: rows by index are contiguous, those
+    # of an unpacked array are not, and an argument that is left out has a type of its own.
+    posture, least, most = task.joints[0], task.joints[4], task.joints[5]
+    limits = JointLimits(task.joints[1], task.joints[2], task.joints[3])
+    velocity = joint_velocities(jacobian, twist, arm.joint_pos, posture, limits, DAMPING, POSTURE_GAIN, LIMIT_GAIN)
     joints = len(velocity)
     acceleration = np.empty(joints)
     for k in range(joints):

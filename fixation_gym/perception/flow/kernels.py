@@ -1,4 +1,8 @@
-"""Compiled loops for the flow, and how those of all of perception are compiled."""
+"""Compiled loops for the flow, and how those of all of perception are compiled.
+
+Arrays are filled by loops: an assignment of an array to a part of another one would take numba five seconds, which
+compile the message about shapes that do not fit.
+"""
 
 from __future__ import annotations
 
@@ -51,10 +55,13 @@ def _cell_weights(pixels):
     Cells are as wide as 2 pixels, or a little wider where the pixels are odd in number.
     """
     cells = pixels // 2
-    spill = pixels % 2 * np.arange(cells + 1) / cells  # the part of pixel 2 i that lies in cell i - 1
-    weights = np.ones((3, cells), np.float32)
-    weights[0], weights[2] = 1 - spill[:-1], spill[1:]
-    return weights * np.float32(2 * cells / pixels)
+    weights, whole = np.empty((3, cells), np.float32), np.float32(2 * cells / pixels)
+    for i in range(cells):
+        # The part of pixel 2 i that lies in cell i - 1, and of pixel 2 i + 2 in cell i.
+        before, after = pixels % 2 * i / cells, pixels % 2 * (i + 1) / cells
+        weights[0, i], weights[1, i] = np.float32(1 - before) * whole, whole
+        weights[2, i] = np.float32(after) * whole
+    return weights
 
 
 @compiled
@@ -120,8 +127,8 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
             for i in range(width // 2):
                 first, second, third = line[2 * i], line[2 * i + 1], line[min(2 * i + 2, width - 1)]
                 if odd:
-                    w = column_weights[:, i]
-                    out[i] = last * (w[0] * first + w[1] * second + w[2] * third)
+                    before, own_part, after = column_weights[0, i], column_weights[1, i], column_weights[2, i]
+                    out[i] = last * (before * first + own_part * second + after * third)
                 else:
                     out[i] = first + second
 
