@@ -46,25 +46,24 @@ class View:
             height: image rows, px.
             width: image columns, px.
             full_quality: with robot and shadows, for people; otherwise what the wrist camera needs.
-            supersampling: pixels rendered per pixel of the image along each side, without ``full_quality``; 1 is faster
-                and enough where all edges of interest are inside textures.
+            supersampling: pixels rendered per pixel of the image along each side; 1 is faster and enough where all
+                edges of interest are inside textures.
             fovy: vertical field of view, rad; None: that of the camera in the model.
 
         Raises:
             RuntimeError: in a process forked from one that has rendered, where GL would wait for ever.
         """
         # Perception needs anti-aliasing: without it static edges flicker and read as motion. In software GL, twice the
-        # resolution averaged down costs less than four samples per pixel; people get both samples and shadows.
+        # resolution averaged down costs less than four samples per pixel.
         self._size = (height, width)
-        factor = 1 if full_quality else supersampling
-        fine = (factor * height, factor * width)
+        fine = (supersampling * height, supersampling * width)
         # The context takes these from the model; a larger buffer costs time in every frame.
         model.vis.global_.offheight, model.vis.global_.offwidth = fine
-        model.vis.quality.offsamples = 4 if full_quality else 0
+        model.vis.quality.offsamples = 0
         model.vis.quality.shadowsize = 1024
         if not full_quality:  # boxes are lit at corners of so many quads along a side: more show in highlights only
             model.vis.quality.numquads = min(model.vis.quality.numquads, 2)
-        self._renderer = Offscreen(model, *fine, nearest_texels=factor > 1)
+        self._renderer = Offscreen(model, *fine, nearest_texels=supersampling > 1)
         self._pixels = np.empty((*fine, 3), np.uint8)
         self._model = model
         # Images are taken of a copy, so that an exposure before the end of the period leaves the physics untouched.
@@ -114,8 +113,6 @@ class View:
         self._renderer.upload_textures()
         self._renderer.render(out=self._pixels)
         height, width = self._size
-        if self._full_quality:
-            return self._pixels.copy()
         return np.asarray(cv2.resize(self._pixels, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
     def _looks_up(self) -> bool:
