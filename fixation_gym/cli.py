@@ -10,6 +10,7 @@ import contextlib
 import errno
 import io
 import json
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -56,6 +57,8 @@ class Demo(EvaluationConfig):
     def run(self) -> int:
         """Film and print the table."""
         self.check()
+        # One environment alone in a process that does not fork: here threads of Mesa's are safe, and have work.
+        os.environ.setdefault("LP_NUM_THREADS", "2")
         select_backend()
         from fixation_gym.evaluation.demo import SHEET_FILE, VIDEO_FILE, run_demo
         from fixation_gym.evaluation.report import format_table

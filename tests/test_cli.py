@@ -207,6 +207,7 @@ def test_demo_films_four_scenarios_by_default(
         return evaluate.summary_of(config, [], 0.0)
 
     monkeypatch.setattr(demo, "run_demo", fake_demo)
+    monkeypatch.setenv("LP_NUM_THREADS", "0")  # the command sets it for its process, which here is that of all tests
     assert cli.main(["demo", "--out", str(tmp_path)]) == 0
     assert str(tmp_path / "demo.mp4") in capsys.readouterr().out
 

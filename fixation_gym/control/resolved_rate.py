@@ -95,8 +95,7 @@ def _least_squares(
     rest = np.empty(rows)
     weight = np.ones(rows)
     if held.any():
-        for i in range(3):
-            weight[i] = _TRANSLATION_WEIGHT
+        weight[:3] = _TRANSLATION_WEIGHT
     for i in range(rows):
         rest[i] = twist[i]
         for k in range(joints):

@@ -8,7 +8,7 @@ import numpy as np
 from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow.zero_flow import UNKNOWN, obstacle_centre
-from fixation_gym.types import FloatArray, ImageArray
+from fixation_gym.types import ImageArray
 
 FRONT_RGB = (255, 140, 0)
 """Nearer than the fixated object: orange."""

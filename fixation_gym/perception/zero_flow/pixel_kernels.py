@@ -79,14 +79,14 @@ def pooled_evidence(p_nearer, supported, moving, cells):
     """
     height, width = p_nearer.shape
     side = cells.shape[1]
-    cells.fill(np.float32(0))
+    cells[:] = np.float32(0)
     area = np.float32(side * side) / np.float32(height * width)
     line = np.empty((5, side + 1), np.float32)
     front, front_squared, behind, behind_squared, seen = line[0], line[1], line[2], line[3], line[4]
     column_cells, column_shares = _cells_of(side, width)
     row_cells, row_shares = _cells_of(side, height)
     for row in range(height):
-        line.fill(np.float32(0))
+        line[:] = np.float32(0)
         evidence, known, own = p_nearer[row], supported[row], moving[row]
         for i in range(width):
             if known[i] or own[i]:
