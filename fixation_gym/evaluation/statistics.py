@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.special import ndtri
 
 
 def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -28,12 +27,11 @@ def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[f
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
     if n == 0:
         return 0.0, 1.0
-    z, rate = float(ndtri(0.5 + 0.5 * confidence)), successes / n
-    centre = (2 * n * rate + z**2) / (2 * (n + z**2))
-    reach = z * math.sqrt(4 * n * rate * (1.0 - rate) + z**2) / (2 * (n + z**2))
+    from scipy.stats import binomtest  # a second to import
+
+    interval = binomtest(successes, n).proportion_ci(confidence, method="wilson")
     # Rounding must not exclude the observed rate at its limits.
-    low = 0.0 if successes == 0 else min(centre - reach, rate)
-    return low, 1.0 if successes == n else max(centre + reach, rate)
+    return min(float(interval.low), successes / n), max(float(interval.high), successes / n)
 
 
 def mcnemar_p(first_only: int, second_only: int) -> float:
