@@ -20,6 +20,8 @@ _SLACK = 1e-6
 """Boxes are only said to be far apart by their spheres if they are so by this much, m: rounding decides nothing."""
 _PARALLEL = 1e-9
 """Less than this is no distance along the normal of two edges, m."""
+_SURE = 1e-10
+"""Boxes that overlap by this along every axis meet whatever rounding does, m."""
 
 
 class Aligned(NamedTuple):
@@ -72,6 +74,27 @@ def any_meets(target: FloatArray, axes: FloatArray, boxes: BoxSet, others: Align
 @njit(cache=True)
 def meets(target: FloatArray, axes: FloatArray, boxes: BoxSet, others: Aligned) -> bool:
     """The same for one camera, axes (3, 3)."""
+    return _first_met(target, axes, boxes, others)[0] >= 0
+
+
+@njit(cache=True)
+def steps_past(target: FloatArray, axes: FloatArray, boxes: BoxSet, others: Aligned, step: FloatArray) -> int:
+    """Number of steps, (3,), m, that surely leave boxes where they meet one along a camera's axes, and one more.
+
+    0 if they meet none as they are.
+    """
+    i, k = _first_met(target, axes, boxes, others)
+    if i < 0:
+        return 0
+    x, y, z = _turned(axes, boxes.centres[i], target)
+    offset = x - others.centres[k, 0], y - others.centres[k, 1], z - others.centres[k, 2]
+    rotation = _turned_axes(axes, boxes.rotations[i])
+    return _steps_apart(offset, _along(axes, step, 1.0), rotation, _row(boxes.halves, i), _row(others.halves, k))
+
+
+@njit(cache=True)
+def _first_met(target: FloatArray, axes: FloatArray, boxes: BoxSet, others: Aligned) -> tuple[int, int]:
+    """Indices of a box and of one along a camera's axes, from the target on, that it meets; -1 if there is none."""
     for i in range(len(boxes.centres)):
         half = _row(boxes.halves, i)
         place = _turned(axes, boxes.centres[i], target)
@@ -85,28 +108,44 @@ def meets(target: FloatArray, axes: FloatArray, boxes: BoxSet, others: Aligned) 
                 place[2] - others.centres[k, 2],
             )
             if _meets_aligned(offset, rotation, half, _row(others.halves, k)):
-                return True
-    return False
+                return i, k
+    return -1, -1
 
 
 @njit(cache=True)
-def may_meet(target: FloatArray, axes: FloatArray, middle: FloatArray, radius: float, others: Aligned) -> bool:
-    """Whether anything within a sphere could meet a box along a camera's axes, (3, 3)."""
-    return not _is_outside(_turned(axes, middle, target), others.low, others.high, radius + _SLACK)
+def may_meet(target: FloatArray, axes: FloatArray, sphere: FloatArray, others: Aligned) -> bool:
+    """Whether anything within a sphere, (4,), could meet a box along a camera's axes, (3, 3)."""
+    return not _is_outside(_turned(axes, sphere, target), others.low, others.high, sphere[3] + _SLACK)
 
 
 @njit(cache=True)
 def any_pair_meets(first: BoxSet, second: BoxSet, gap: float) -> bool:
     """Whether a box of one set comes nearer than about ``gap`` m to one of the other."""
     for i in range(len(first.centres)):  # noqa: SIM110 (numba knows no generators)
-        if _one_meets(first, i, second, gap):
+        if _one_met(first, i, second, gap) >= 0:
             return True
     return False
 
 
 @njit(cache=True)
-def _one_meets(first: BoxSet, i: int, second: BoxSet, gap: float) -> bool:
-    """The same for one box of the first set."""
+def steps_off(first: BoxSet, second: BoxSet, gap: float, step: FloatArray) -> int:
+    """Number of steps, (3,), m, that surely leave the first boxes so near to the second ones, and one more.
+
+    0 if they are not so near as they are.
+    """
+    for i in range(len(first.centres)):
+        j = _one_met(first, i, second, gap)
+        if j >= 0:
+            axes = first.rotations[i].T
+            half = first.halves[i, 0] + gap, first.halves[i, 1] + gap, first.halves[i, 2] + gap
+            offset, rotation = _turned(axes, second.centres[j], first.centres[i]), _turned_axes(axes, second.rotations[j])
+            return _steps_apart(offset, _along(axes, step, -1.0), rotation, _row(second.halves, j), half)
+    return 0
+
+
+@njit(cache=True)
+def _one_met(first: BoxSet, i: int, second: BoxSet, gap: float) -> int:
+    """Index of a box of the second set that comes so near to one of the first; -1 if none does."""
     half = (first.halves[i, 0] + gap, first.halves[i, 1] + gap, first.halves[i, 2] + gap)
     radius, axes = _length(half), first.rotations[i].T
     for j in range(len(second.centres)):
@@ -114,8 +153,8 @@ def _one_meets(first: BoxSet, i: int, second: BoxSet, gap: float) -> bool:
         if _length(offset) > radius + _length(other) + _SLACK:
             continue
         if _meets_aligned(offset, _turned_axes(axes, second.rotations[j]), other, half):
-            return True
-    return False
+            return j
+    return -1
 
 
 @njit(cache=True)
@@ -123,30 +162,34 @@ def pairs_that_meet(boxes: BoxSet, ends: NDArray[np.int64], gap: float) -> MaskA
     """The compiled part of ``meeting_pairs``: set i has the boxes from ``ends[i]`` to ``ends[i + 1]``."""
     count = len(ends) - 1
     meet = np.zeros((count, count), np.bool_)
-    middles, radii = np.empty((count, 3)), np.empty(count)
-    for i in range(count):
-        middles[i], radii[i] = sphere_around(part_of(boxes, ends[i], ends[i + 1]))
+    spheres = spheres_around(boxes, ends)
     for i in range(count):
         for j in range(i):
-            if _distance(middles[i], middles[j]) > radii[i] + radii[j] + 2.0 * gap + _SLACK:
+            room = spheres[j, 3] + 2.0 * gap + _SLACK
+            if _distance(spheres[i], spheres[j]) > spheres[i, 3] + room:
                 continue
             others = part_of(boxes, ends[j], ends[j + 1])
             for box in range(ends[i], ends[i + 1]):
-                if _one_meets(boxes, box, others, gap):
+                if _distance(boxes.centres[box], spheres[j]) > _length(_row(boxes.halves, box)) + room:
+                    continue
+                if _one_met(boxes, box, others, gap) >= 0:
                     meet[i, j] = meet[j, i] = True
                     break
     return meet
 
 
 @njit(cache=True)
-def sphere_around(boxes: BoxSet) -> tuple[FloatArray, float]:
-    """Middle, (3,), and radius of a sphere around some boxes, m."""
-    middle, radius = np.zeros(3), 0.0
-    for centre in boxes.centres:
-        middle += centre / len(boxes.centres)
-    for i in range(len(boxes.centres)):
-        radius = max(radius, _distance(boxes.centres[i], middle) + _length(_row(boxes.halves, i)))
-    return middle, radius
+def spheres_around(boxes: BoxSet, ends: NDArray[np.int64]) -> FloatArray:
+    """Middles and radii of spheres around the boxes from ``ends[i]`` to ``ends[i + 1]``, shape (n, 4), m."""
+    spheres = np.zeros((len(ends) - 1, 4))
+    for i in range(len(spheres)):
+        for box in range(ends[i], ends[i + 1]):
+            for axis in range(3):
+                spheres[i, axis] += boxes.centres[box, axis] / (ends[i + 1] - ends[i])
+        for box in range(ends[i], ends[i + 1]):
+            radius = _distance(boxes.centres[box], spheres[i]) + _length(_row(boxes.halves, box))
+            spheres[i, 3] = max(spheres[i, 3], radius)
+    return spheres
 
 
 @njit(cache=True)
@@ -169,6 +212,17 @@ def _distance(first: FloatArray, second: FloatArray) -> float:
 def _turned(axes: FloatArray, place: FloatArray, origin: FloatArray) -> Triple:
     """A place in the frame at ``origin`` whose axes are the rows of ``axes``."""
     x, y, z = place[0] - origin[0], place[1] - origin[1], place[2] - origin[2]
+    return (
+        axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z,
+        axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z,
+        axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z,
+    )
+
+
+@njit(cache=True)
+def _along(axes: FloatArray, step: FloatArray, sign: float) -> Triple:
+    """A step in the frame whose axes are the rows of ``axes``, or the opposite one."""
+    x, y, z = sign * step[0], sign * step[1], sign * step[2]
     return (
         axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z,
         axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z,
@@ -235,3 +289,43 @@ def _meets_aligned(offset: Triple, rotation: tuple[Triple, Triple, Triple], half
         or abs(y * r01 - x * r11) > g0 * a11 + g1 * a01 + (h2 * a20 + h0 * a22) + _PARALLEL
         or abs(y * r02 - x * r12) > g0 * a12 + g1 * a02 + (h0 * a21 + h1 * a20) + _PARALLEL
     )
+
+
+@njit(cache=True)
+def _steps_apart(
+    offset: Triple, shift: Triple, rotation: tuple[Triple, Triple, Triple], half: Triple, aligned: Triple
+) -> int:
+    """Number of steps after which two boxes that meet, as above, may do so no more: 1 or more.
+
+    Along each of the axes they overlap for some steps, and they meet while they do along all of them. ``shift`` is how
+    one step moves the turned box, m.
+    """
+    last = 1e6
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        reach, other, along, speed = aligned[i], half[i], 0.0, 0.0
+        for m in range(3):
+            reach += abs(rotation[i][m]) * half[m]
+            other += abs(rotation[m][i]) * aligned[m]
+            along, speed = along + offset[m] * rotation[m][i], speed + shift[m] * rotation[m][i]
+        last = min(last, _overlap(offset[i], shift[i], reach), _overlap(along, speed, other))
+        for m in range(3):
+            n, o = (m + 1) % 3, (m + 2) % 3
+            edges = aligned[j] * abs(rotation[k][m]) + aligned[k] * abs(rotation[j][m]) + _PARALLEL
+            edges += half[n] * abs(rotation[i][o]) + half[o] * abs(rotation[i][n])
+            along = offset[k] * rotation[j][m] - offset[j] * rotation[k][m]
+            speed = shift[k] * rotation[j][m] - shift[j] * rotation[k][m]
+            last = min(last, _overlap(along, speed, edges))
+    return max(1, math.ceil(last))
+
+
+@njit(cache=True)
+def _overlap(along: float, speed: float, reach: float) -> float:
+    """For how many steps boxes surely overlap along an axis: as long as ``along``, which grows by ``speed``, is less.
+
+    All in m, ``reach`` being the sum of their half widths.
+    """
+    reach -= _SURE
+    if abs(along) > reach:
+        return 0.0
+    return np.inf if speed == 0.0 else (reach - math.copysign(1.0, speed) * along) / abs(speed)

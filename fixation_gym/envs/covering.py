@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Aligned, any_pair_meets, may_meet, meets, part_of, sphere_around
+from fixation_gym.control.box_tests import Aligned, any_pair_meets, may_meet, meets, part_of, spheres_around
 from fixation_gym.envs.drafts import Drafts, Indices
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray, MaskArray
@@ -35,8 +35,9 @@ def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Al
     """
     sizes = np.sum(quota.groups, axis=1)
     counts = np.zeros(len(sizes), np.int64)
-    for way in range(len(hands)):
-        if meets(target, hands[way], drafts.boxes, smaller):
+    spheres = spheres_around(drafts.boxes, drafts.ends)
+    for way in range(len(hands) - 1, -1, -1):  # those from above come last, and are the hardest to bar
+        if _is_met(target, hands[way], drafts, spheres, smaller):
             continue
         for group in range(len(sizes)):
             counts[group] += quota.groups[group, way]
@@ -46,14 +47,25 @@ def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Al
 
 
 @njit(cache=True)
+def _is_met(target: FloatArray, hand: FloatArray, drafts: Drafts, spheres: FloatArray, smaller: Aligned) -> bool:
+    """Whether one of the drafts, with spheres around them, bars a way."""
+    for index in range(len(drafts.kinds)):
+        if may_meet(target, hand, spheres[index], smaller):
+            boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
+            if meets(target, hand, boxes, smaller):
+                return True
+    return False
+
+
+@njit(cache=True)
 def barred_ways(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Aligned) -> MaskArray:
     """Ways that each of n drafts bars, shape (n, ways); arguments as above."""
     barred = np.zeros((len(drafts.kinds), len(hands)), np.bool_)
+    spheres = spheres_around(drafts.boxes, drafts.ends)
     for index in range(len(drafts.kinds)):
         boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
-        middle, radius = sphere_around(boxes)
         for way in range(len(hands)):
-            if may_meet(target, hands[way], middle, radius, smaller):
+            if may_meet(target, hands[way], spheres[index], smaller):
                 barred[index, way] = meets(target, hands[way], boxes, smaller)
     return barred
 

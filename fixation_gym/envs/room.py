@@ -8,13 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Aligned, any_pair_meets, meets
+from fixation_gym.control.box_tests import Aligned, steps_off, steps_past
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray
 
 _ORBIT = 0.355
 """What is seen above a slope of ``_FLAT`` from the target stays this near, m: the hand goes around farther out."""
 _FLAT = 0.5
+_FOR_GOOD = 2
+"""Said of an obstacle that is beside the table."""
 _TARGET_GAP = 0.012
 """Least room between an obstacle and red things, m."""
 FREE_ROOM = 0.01
@@ -48,33 +50,38 @@ def steps_to_room(boxes: BoxSet, step: FloatArray, most: int, room: Room) -> int
         most: largest number of steps.
         room: what it must keep clear of.
     """
-    latest, ways = 0, len(room.ways)
+    latest, count = 0, 0
     moved = BoxSet(boxes.centres.copy(), boxes.rotations, boxes.halves)
-    for count in range(most + 1):
+    while count <= most:
         for i in range(len(boxes.centres)):
             for axis in range(3):
                 moved.centres[i, axis] = boxes.centres[i, axis] + count * step[axis]
-        met = -1
-        for pair in range(len(room.ends) * ways):
-            # What was met a step ago is probably met once more.
-            way = (latest + pair) % (len(room.ends) * ways)
-            if meets(room.ends[way // ways], room.ways[way % ways], moved, room.swept):
-                met = way
-                break
-            if pair == 0 and not _is_clear(moved, room):
-                met = latest
-                break
-        if met < 0:
+        more = _off_bounds(moved, step, room)
+        if more == _FOR_GOOD:
+            return -1
+        if more == 0:
+            more, latest = _steps_off_ways(moved, step, latest, room)
+        if more == 0:
+            more = steps_off(moved, room.reds, _TARGET_GAP, step)
+        if more == 0:
             return count
-        latest = met
+        count += more
     return -1
 
 
 @njit(cache=True)
-def _is_clear(boxes: BoxSet, room: Room) -> bool:
-    """Whether an obstacle is above the table and beside the target."""
-    within = _within_bounds(boxes, room.table, room.reds.centres[0])
-    return within and not any_pair_meets(boxes, room.reds, _TARGET_GAP)
+def _steps_off_ways(boxes: BoxSet, step: FloatArray, latest: int, room: Room) -> tuple[int, int]:
+    """Number of steps to a place that may be off the free ways, 0 if this one is, and the way that is met.
+
+    The way with index ``latest`` is looked at first.
+    """
+    ways = len(room.ways)
+    for pair in range(len(room.ends) * ways):
+        way = (latest + pair) % (len(room.ends) * ways)
+        more = steps_past(room.ends[way // ways], room.ways[way % ways], boxes, room.swept, step)
+        if more > 0:
+            return more, way
+    return 0, latest
 
 
 def holds(room: Room, boxes: BoxSet) -> bool:
@@ -83,9 +90,13 @@ def holds(room: Room, boxes: BoxSet) -> bool:
 
 
 @njit(cache=True)
-def _within_bounds(boxes: BoxSet, table: FloatArray, target: FloatArray) -> bool:
-    """Whether boxes are above the table, and within ``_ORBIT`` of the target if the hand might meet them there."""
-    low, high = np.empty(3), np.empty(3)
+def _off_bounds(boxes: BoxSet, step: FloatArray, room: Room) -> int:
+    """0 if boxes are above the table, and within ``_ORBIT`` of the target if the hand might meet them there.
+
+    ``_FOR_GOOD`` if they are beside the table, where further steps do not bring them back; 1 if they are out otherwise.
+    """
+    low, high, table, target = np.empty(3), np.empty(3), room.table, room.reds.centres[0]
+    out = 0
     for i in range(len(boxes.centres)):
         for axis in range(3):
             reach = 0.0
@@ -93,11 +104,13 @@ def _within_bounds(boxes: BoxSet, table: FloatArray, target: FloatArray) -> bool
                 reach += abs(boxes.rotations[i, axis, k]) * boxes.halves[i, k]
             low[axis], high[axis] = boxes.centres[i, axis] - reach, boxes.centres[i, axis] + reach
         for axis in range(2):
-            if low[axis] < table[axis, 0] or high[axis] > table[axis, 1]:
-                return False
+            if low[axis] < table[axis, 0]:
+                out = max(out, _FOR_GOOD if step[axis] <= 0.0 else 1)
+            if high[axis] > table[axis, 1]:
+                out = max(out, _FOR_GOOD if step[axis] >= 0.0 else 1)
         x = max(abs(low[0] - target[0]), abs(high[0] - target[0]))
         y = max(abs(low[1] - target[1]), abs(high[1] - target[1]))
         across, rise = math.hypot(x, y), high[2] - target[2]
         if rise > _FLAT * across and math.hypot(across, rise) > _ORBIT:
-            return False
-    return True
+            out = max(out, 1)
+    return out
