@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from fixation_gym.control.box_tests import Aligned, boxes_meet, pairs_that_meet
+from fixation_gym.control.box_tests import boxes_meet, packed, packed_hand, pairs_that_meet
 from fixation_gym.control.corridor import hand_axes, hand_boxes, swept_hand
 from fixation_gym.control.reach import REACH_GRID
 from fixation_gym.envs.config import Scenario
@@ -121,9 +122,10 @@ def _aim(goal: Goal) -> Aim:
     return Aim(goal.room.ends[-1], goal.free.azimuth, goal.free.direction, goal.ways, np.flatnonzero(_ABOVE))
 
 
-def _smaller_hand() -> Aligned:
-    """What surely touches an obstacle on a way that counts as barred."""
-    return swept_hand(-_BARRED_DEPTH, wrist=False)
+@cache
+def _smaller_hand() -> FloatArray:
+    """What surely touches an obstacle on a way that counts as barred, as in ``box_tests.packed_hand``."""
+    return packed_hand(swept_hand(-_BARRED_DEPTH, wrist=False))
 
 
 def _quota(goal: Goal, most_among: float) -> Quota:
@@ -143,7 +145,9 @@ def bar_ways(
 
     Those that bar most are taken, if they have room beside the others and do not hide the target.
     """
-    usable = apart_from(pool.drafts, joined([hand_boxes(view.pose), *view.taken]), _START_ROOM)
+    usable = apart_from(
+        pool.drafts.boxes, pool.drafts.ends, packed(joined([hand_boxes(view.pose), *view.taken])), _START_ROOM
+    )
     firsts = pool.drafts.first & usable
     if not is_barred(~np.logical_or.reduce(pool.barred[usable], axis=0), view.first_sight, pool.quota):
         return None

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Aligned, any_pair_meets, may_meet, meets, part_of, spheres_around
+from fixation_gym.control.box_tests import any_pair_meets, may_meet, meets, spheres_around
 from fixation_gym.envs.drafts import Drafts, Indices
-from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray, MaskArray
 
 
@@ -23,60 +22,56 @@ class Quota(NamedTuple):
 
 
 @njit(cache=True)
-def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Aligned, quota: Quota) -> bool:
+def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: FloatArray, quota: Quota) -> bool:
     """Whether all drafts together would bar enough; most do not, which is soon known.
 
     Args:
         target: in base, shape (3,), m.
         hands: axes of the hand on all ways, shape (n, 3, 3).
         drafts: the obstacles.
-        smaller: what a hand sweeps that is smaller than the real one.
+        smaller: what a hand sweeps that is smaller than the real one, as in ``box_tests.packed_hand``.
         quota: how many ways may stay open.
     """
-    sizes = np.sum(quota.groups, axis=1)
-    counts = np.zeros(len(sizes), np.int64)
-    spheres = spheres_around(drafts.boxes, drafts.ends)
+    groups, most_open, boxes, ends = quota.groups, quota.most_open, drafts.boxes, drafts.ends
+    sizes, counts = np.zeros(len(groups), np.int64), np.zeros(len(groups), np.int64)
+    for group in range(len(groups)):
+        for way in range(len(hands)):
+            sizes[group] += groups[group, way]
+    spheres = spheres_around(boxes, ends)
     for way in range(len(hands) - 1, -1, -1):  # those from above come last, and are the hardest to bar
-        if _is_met(target, hands[way], drafts, spheres, smaller):
+        met = False
+        for index in range(len(spheres)):
+            if may_meet(target, hands, way, spheres, index, smaller):
+                met |= meets(target, hands, way, boxes, ends[index], ends[index + 1], smaller)
+            if met:
+                break
+        if met:
             continue
         for group in range(len(sizes)):
-            counts[group] += quota.groups[group, way]
-            if counts[group] / max(sizes[group], 1) > quota.most_open[group]:
+            counts[group] += groups[group, way]
+            if counts[group] / max(sizes[group], 1) > most_open[group]:
                 return False
     return True
 
 
 @njit(cache=True)
-def _is_met(target: FloatArray, hand: FloatArray, drafts: Drafts, spheres: FloatArray, smaller: Aligned) -> bool:
-    """Whether one of the drafts, with spheres around them, bars a way."""
-    for index in range(len(drafts.kinds)):
-        if may_meet(target, hand, spheres[index], smaller):
-            boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
-            if meets(target, hand, boxes, smaller):
-                return True
-    return False
-
-
-@njit(cache=True)
-def barred_ways(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Aligned) -> MaskArray:
+def barred_ways(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: FloatArray) -> MaskArray:
     """Ways that each of n drafts bars, shape (n, ways); arguments as above."""
-    barred = np.zeros((len(drafts.kinds), len(hands)), np.bool_)
-    spheres = spheres_around(drafts.boxes, drafts.ends)
-    for index in range(len(drafts.kinds)):
-        boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
+    boxes, ends = drafts.boxes, drafts.ends
+    barred, spheres = np.zeros((len(ends) - 1, len(hands)), np.bool_), spheres_around(boxes, ends)
+    for index in range(len(spheres)):
         for way in range(len(hands)):
-            if may_meet(target, hands[way], spheres[index], smaller):
-                barred[index, way] = meets(target, hands[way], boxes, smaller)
+            if may_meet(target, hands, way, spheres, index, smaller):
+                barred[index, way] = meets(target, hands, way, boxes, ends[index], ends[index + 1], smaller)
     return barred
 
 
 @njit(cache=True)
-def apart_from(drafts: Drafts, others: BoxSet, gap: float) -> MaskArray:
-    """Which drafts keep about ``gap`` m away from other boxes."""
-    apart = np.ones(len(drafts.kinds), np.bool_)
-    for index in range(len(drafts.kinds)):
-        boxes = part_of(drafts.boxes, drafts.ends[index], drafts.ends[index + 1])
-        apart[index] = not any_pair_meets(boxes, others, gap)
+def apart_from(boxes: FloatArray, ends: Indices, others: FloatArray, gap: float) -> MaskArray:
+    """Which drafts, the boxes from ``ends[i]`` to ``ends[i + 1]``, keep about ``gap`` m away from other boxes."""
+    apart = np.ones(len(ends) - 1, np.bool_)
+    for index in range(len(apart)):
+        apart[index] = not any_pair_meets(boxes, ends[index], ends[index + 1], others, gap)
     return apart
 
 

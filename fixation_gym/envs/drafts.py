@@ -10,13 +10,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fixation_gym.control.box_tests import BOX_COLUMNS, Triple
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS, kinds_of
 from fixation_gym.envs.obstacle_parts import write_parts
-from fixation_gym.envs.part_rows import COLUMNS, MOST_PARTS, PITCH, YAW, uniform
+from fixation_gym.envs.part_rows import COLUMNS, MOST_PARTS, PITCH, YAW, below, uniform
 from fixation_gym.envs.room import Room, steps_to_room
 from fixation_gym.envs.shapes import MATERIALS
-from fixation_gym.geometry.boxes import BoxSet, joined
 from fixation_gym.types import FloatArray, MaskArray
 
 Indices = NDArray[np.int64]
@@ -70,8 +70,8 @@ class Drafts(NamedTuple):
     """The parts of draft i are those from ``ends[i]`` to ``ends[i + 1]``, shape (n + 1,)."""
     rows: FloatArray
     """Parts in the floor frames, as in ``part_rows``."""
-    boxes: BoxSet
-    """Boxes around the parts, in base."""
+    boxes: FloatArray
+    """Boxes around the parts, in base, as in ``box_tests.packed``."""
 
 
 @cache
@@ -104,7 +104,7 @@ def joined_drafts(first: Drafts, second: Drafts) -> Drafts:
         np.concatenate([first.facings, second.facings]),
         np.concatenate([first.ends, first.ends[-1] + second.ends[1:]]),
         np.concatenate([first.rows, second.rows]),
-        joined([first.boxes, second.boxes]),
+        np.concatenate([first.boxes, second.boxes]),
     )
 
 
@@ -120,7 +120,7 @@ def chosen_drafts(drafts: Drafts, chosen: Indices) -> Drafts:
         drafts.facings[chosen],
         np.concatenate([[0], np.cumsum(counts[chosen])]),
         drafts.rows[parts],
-        BoxSet(drafts.boxes.centres[parts], drafts.boxes.rotations[parts], drafts.boxes.halves[parts]),
+        drafts.boxes[parts],
     )
 
 
@@ -146,7 +146,7 @@ def draw_for_ways(
             break
         # Half of the ways to be barred come from above, which is the harder to bar.
         above = rng.random() < 0.5
-        way = aim.above[rng.integers(0, len(aim.above))] if above else rng.integers(0, len(aim.ways))
+        way = aim.above[below(rng, len(aim.above))] if above else below(rng, len(aim.ways))
         kept += _draw(drafts, kept, first, aim.ways[way], past, aim, room, menu, rng)
     return _filled(drafts, kept)
 
@@ -166,9 +166,9 @@ def draw_across(
 @njit(cache=True)
 def _empty(count: int) -> Drafts:
     most = count * MOST_PARTS
-    boxes = BoxSet(np.empty((most, 3)), np.empty((most, 3, 3)), np.empty((most, 3)))
     kinds, materials, first = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.bool_)
     ends, rows = np.zeros(count + 1, np.int64), np.empty((most, COLUMNS))
+    boxes = np.empty((most, BOX_COLUMNS))
     return Drafts(kinds, materials, first, np.empty((count, 3)), np.empty(count), ends, rows, boxes)
 
 
@@ -176,7 +176,6 @@ def _empty(count: int) -> Drafts:
 def _filled(drafts: Drafts, count: int) -> Drafts:
     """The first ``count`` of them."""
     most = drafts.ends[count]
-    boxes = BoxSet(drafts.boxes.centres[:most], drafts.boxes.rotations[:most], drafts.boxes.halves[:most])
     return Drafts(
         drafts.kinds[:count],
         drafts.materials[:count],
@@ -185,7 +184,7 @@ def _filled(drafts: Drafts, count: int) -> Drafts:
         drafts.facings[:count],
         drafts.ends[: count + 1],
         drafts.rows[:most],
-        boxes,
+        drafts.boxes[:most],
     )
 
 
@@ -202,75 +201,89 @@ def _draw(
     rng: np.random.Generator,
 ) -> int:
     """Draw an obstacle beyond ``way``, as near to the target as the free ways allow; returns 1 if it has room, or 0."""
-    beyond = _beyond(aim.free, way, uniform(rng, past[0], past[1]))
-    choice = 0 if first else rng.integers(0, len(menu.materials))
-    kinds = _suitable_kinds(menu, menu.kinds[int(first), choice], beyond[2])
-    if len(kinds) == 0:
+    x, y, steepness = _beyond(aim.free, way, uniform(rng, past[0], past[1]))
+    choice = 0 if first else below(rng, len(menu.materials))
+    kinds = menu.kinds[int(first), choice]
+    suitable = _suitable_kind(menu, kinds, steepness, len(kinds))[1]
+    if suitable == 0:
         return 0
-    kind = kinds[rng.integers(0, len(kinds))]
-    around, (nearest, farthest) = menu.around[kind], (menu.distances[kind, 0], menu.distances[kind, 1])
-    bearing = aim.azimuth if around else math.atan2(-beyond[1], -beyond[0]) + rng.normal(0.0, 0.2)
-    x, y = aim.target[0] - nearest * math.cos(bearing), aim.target[1] - nearest * math.sin(bearing)
+    kind = _suitable_kind(menu, kinds, steepness, below(rng, suitable))[0]
+    around, nearest, farthest = menu.around[kind], menu.distances[kind, 0], menu.distances[kind, 1]
+    bearing = aim.azimuth if around else math.atan2(-y, -x) + rng.normal(0.0, 0.2)
+    origin, most = drafts.origins[index], int((farthest - nearest) / _STEP_OUT)
+    origin[0] = aim.target[0] - nearest * math.cos(bearing)
+    origin[1] = aim.target[1] - nearest * math.sin(bearing)
+    origin[2] = room.height
     facing = bearing + uniform(rng, -0.4, 0.4) + (math.pi if around else 0.0)
     begin = drafts.ends[index]
     end = begin + write_parts(drafts.rows[begin:], kind, menu.materials[choice], rng)
-    boxes = BoxSet(drafts.boxes.centres[begin:end], drafts.boxes.rotations[begin:end], drafts.boxes.halves[begin:end])
-    _place(drafts.rows[begin:end], x, y, room.height, facing, boxes)
+    boxes = drafts.boxes[begin:end]
+    _place(drafts.rows[begin:end], origin, facing, boxes)
     outward = bearing + math.pi if around else bearing  # what stands around the target draws back from the way
-    step = np.array([-_STEP_OUT * math.cos(outward), -_STEP_OUT * math.sin(outward), 0.0])
-    steps = steps_to_room(boxes, step, int((farthest - nearest) / _STEP_OUT), room)
+    step = (-_STEP_OUT * math.cos(outward), -_STEP_OUT * math.sin(outward), 0.0)
+    steps = steps_to_room(boxes, step, most, room)
     if steps < 0:
         return 0
-    boxes.centres[:] += steps * step
+    for axis in range(3):
+        origin[axis] += steps * step[axis]
+        for i in range(len(boxes)):
+            boxes[i, axis] += steps * step[axis]
     drafts.kinds[index], drafts.materials[index], drafts.first[index] = kind, menu.materials[choice], first
-    drafts.origins[index] = np.array([x, y, room.height]) + steps * step
     drafts.facings[index], drafts.ends[index + 1] = facing, end
     return 1
 
 
 @njit(cache=True)
-def _suitable_kinds(menu: Menu, kinds: MaskArray, steepness: float) -> Indices:
-    """Those of some kinds that stand around the target, or where the sine of the elevation is ``steepness``."""
-    found, count = np.empty(len(kinds), np.int64), 0
+def _suitable_kind(menu: Menu, kinds: MaskArray, steepness: float, wanted: int) -> tuple[int, int]:
+    """Of those of some kinds that stand around the target, or where the sine of the elevation is ``steepness``.
+
+    The one with the index ``wanted``, and how many come before it, which is all of them if there is no such one.
+    """
+    count = 0
     for kind in range(len(kinds)):
         fits = menu.steepness[kind, 0] <= steepness and steepness <= menu.steepness[kind, 1]
         if kinds[kind] and (fits or menu.around[kind]):
-            found[count] = kind
+            if count == wanted:
+                return kind, count
             count += 1
-    return found[:count]
+    return -1, count
 
 
 @njit(cache=True)
-def _place(rows: FloatArray, x: float, y: float, height: float, facing: float, boxes: BoxSet) -> None:
-    """Write the boxes around parts whose floor frame is at a place, turned by ``facing`` about the vertical."""
+def _place(rows: FloatArray, origin: FloatArray, facing: float, boxes: FloatArray) -> None:
+    """Write the boxes around parts whose floor frame is at a place, (3,), turned by ``facing`` about the vertical."""
     c, s = math.cos(facing), math.sin(facing)
     for i in range(len(rows)):
-        row, centre, turn = rows[i], boxes.centres[i], boxes.rotations[i]
-        centre[0], centre[1], centre[2] = c * row[0] - s * row[1] + x, s * row[0] + c * row[1] + y, row[2] + height
-        boxes.halves[i] = row[3:6]
-        cy, sy = math.cos(row[YAW] + facing), math.sin(row[YAW] + facing)
-        cp, sp = math.cos(row[PITCH]), math.sin(row[PITCH])
-        turn[0, 0], turn[0, 1], turn[0, 2] = cy * cp, -sy, cy * sp
-        turn[1, 0], turn[1, 1], turn[1, 2] = sy * cp, cy, sy * sp
-        turn[2, 0], turn[2, 1], turn[2, 2] = -sp, 0.0, cp
+        x, y = rows[i, 0], rows[i, 1]
+        boxes[i, 0], boxes[i, 1] = c * x - s * y + origin[0], s * x + c * y + origin[1]
+        boxes[i, 2] = rows[i, 2] + origin[2]
+        for axis in range(3, 6):
+            boxes[i, axis] = rows[i, axis]
+        cy, sy = math.cos(rows[i, YAW] + facing), math.sin(rows[i, YAW] + facing)
+        cp, sp = math.cos(rows[i, PITCH]), math.sin(rows[i, PITCH])
+        boxes[i, 6], boxes[i, 7], boxes[i, 8] = cy * cp, -sy, cy * sp
+        boxes[i, 9], boxes[i, 10], boxes[i, 11] = sy * cp, cy, sy * sp
+        boxes[i, 12], boxes[i, 13], boxes[i, 14] = -sp, 0.0, cp
 
 
 @njit(cache=True)
-def _beyond(free: FloatArray, way: FloatArray, angle: float) -> FloatArray:
+def _beyond(free: FloatArray, way: FloatArray, angle: float) -> Triple:
     """The direction that lies beyond ``way``, seen from the free one, by ``angle`` rad, but above the table.
 
     What stands there bars the way without being in the free one: the hand is wide.
     """
     along = way[0] * free[0] + way[1] * free[1] + way[2] * free[2]
-    across = way - along * free
+    across = (way[0] - along * free[0], way[1] - along * free[1], way[2] - along * free[2])
     total = math.acos(min(max(along, -1.0), 1.0)) + angle
-    direction = math.cos(total) * free + math.sin(total) / max(_hypot(across), 1e-9) * across
-    direction[2] = max(direction[2], 0.05)
-    return direction / _hypot(direction)
+    share, aside = math.cos(total), math.sin(total) / max(_hypot(across), 1e-9)
+    x, y = share * free[0] + aside * across[0], share * free[1] + aside * across[1]
+    z = max(share * free[2] + aside * across[2], 0.05)
+    length = _hypot((x, y, z))
+    return x / length, y / length, z / length
 
 
 @njit(cache=True)
-def _hypot(vector: FloatArray) -> float:
+def _hypot(vector: Triple) -> float:
     """The length to the last bit, like ``math.hypot``, which numba knows for two numbers only."""
     total, rest = 0.0, 0.0
     for value in vector:

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from fixation_gym.control.box_tests import packed, packed_hand
 from fixation_gym.control.corridor import hand_axes, level_axes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import Scenario
@@ -135,7 +136,7 @@ def _room(target: TargetSpec, free: Way) -> Room:
     ends = places[[0, -1]] if target.motion else places[:1]
     reds = BoxSet(places, box.rotations.repeat(len(places), axis=0), box.halves.repeat(len(places), axis=0))
     table = ROBOT.workspace
-    return Room(table.table_height, np.array(table.table), reds, ends, ways, swept_hand(FREE_ROOM))
+    return Room(table.table_height, np.array(table.table), packed(reds), ends, ways, packed_hand(swept_hand(FREE_ROOM)))
 
 
 def _grasp_turns(target: TargetSpec, free: Way) -> list[float]:

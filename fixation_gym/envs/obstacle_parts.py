@@ -26,6 +26,8 @@ from fixation_gym.envs.part_rows import (
     RIM,
     SOLID,
     TRANSLUCENT,
+    YAW,
+    below,
     either_sign,
     foot,
     parts_of,
@@ -93,12 +95,12 @@ _THING_COUNTS = np.array([len(THINGS[name]) for name in MATERIALS])
 @njit(cache=True)
 def _thing(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A block, brick, post, bottle, tumbler, framed panel, mirror or cage as it is."""
-    shape, scale = rng.integers(0, _THING_COUNTS[material]), uniform(rng, 0.8, 1.0)
+    shape, scale = below(rng, _THING_COUNTS[material]), uniform(rng, 0.8, 1.0)
     labelled, count = rng.random() >= 0.3, 0
     for row in _THINGS[material, shape]:
         if row[DENSITY] > 0.0 and (labelled or row[FINISH] != LABEL):
-            rows[count] = row
-            rows[count, :6] *= scale
+            for column in range(COLUMNS):
+                rows[count, column] = row[column] * scale if column < YAW else row[column]
             count += 1
     most = 0.35 if material in (MIRROR, TRANSLUCENT) else 3.1
     turn(rows, 0, count, uniform(rng, -most, most), _HALF_HEIGHTS[material, shape] * scale)
@@ -196,13 +198,15 @@ def _cabinet(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
 def _niche(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """Three walls in a U, or two in an L, without a roof."""
     half_x, half_y, top = uniform(rng, 0.08, 0.11), uniform(rng, 0.12, 0.16), uniform(rng, 0.12, 0.26)
-    walls = rng.integers(1, 3)
+    walls = 1 + below(rng, 2)
     first = write_pane(rows, 0, material, half_y, 0.5 * top, -half_x, 0.0, 0.5 * top, 0.0)
     count = sides(rows, first, _second(material), half_x, half_y, top, 0.0)
     if walls == 1:
         middle = first + (count - first) // 2
         if rng.random() >= 0.5:
-            rows[first:middle] = rows[middle:count]
+            for row in range(first, middle):
+                for column in range(COLUMNS):
+                    rows[row, column] = rows[row + count - middle, column]
         count = middle
     return foot(rows, count, -half_x - 0.02, 0.0, 0.03, half_y)
 

@@ -138,9 +138,15 @@ def uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 @njit(cache=True)
+def below(rng: np.random.Generator, count: int) -> int:
+    """A whole number from 0 on and less than ``count``, compiled once, too."""
+    return rng.integers(0, count)
+
+
+@njit(cache=True)
 def either_sign(rng: np.random.Generator) -> float:
     """-1 or 1."""
-    return 2.0 * rng.integers(0, 2) - 1.0
+    return 2.0 * below(rng, 2) - 1.0
 
 
 @njit(cache=True)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Aligned, steps_off, steps_past
+from fixation_gym.control.box_tests import Triple, packed, steps_off, steps_past
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray
 
@@ -30,87 +30,74 @@ class Room(NamedTuple):
     """Of the table, in base, m."""
     table: FloatArray
     """Lowest and highest x and y of where obstacles stand, shape (2, 2), in base, m."""
-    reds: BoxSet
-    """Boxes around the target at all its places, the first one first."""
+    reds: FloatArray
+    """Boxes around the target at all its places, the first one first, as in ``box_tests.packed``."""
     ends: FloatArray
     """Where the target is at first and in the end, shape (n, 3), in base, m."""
     ways: FloatArray
     """Axes of the hand, as in ``corridor.hand_axes``, on the ways to it that stay free, shape (m, 3, 3)."""
-    swept: Aligned
-    """What the hand sweeps on them."""
+    swept: FloatArray
+    """What the hand sweeps on them, as in ``box_tests.packed_hand``."""
 
 
 @njit(cache=True)
-def steps_to_room(boxes: BoxSet, step: FloatArray, most: int, room: Room) -> int:
+def steps_to_room(boxes: FloatArray, step: Triple, most: int, room: Room) -> int:
     """Number of steps after which an obstacle has room; -1 if it never has.
 
     Args:
-        boxes: of the obstacle's parts at all its places.
-        step: by which it is moved, shape (3,), m.
+        boxes: of the obstacle's parts at all its places, as in ``box_tests.packed``.
+        step: by which it is moved, m.
         most: largest number of steps.
         room: what it must keep clear of.
     """
-    latest, count = 0, 0
-    moved = BoxSet(boxes.centres.copy(), boxes.rotations, boxes.halves)
+    latest, count, moved = 0, 0, boxes.copy()
+    table, reds, ends, ways, swept = room.table, room.reds, room.ends, room.ways, room.swept
     while count <= most:
-        for i in range(len(boxes.centres)):
+        for i in range(len(boxes)):
             for axis in range(3):
-                moved.centres[i, axis] = boxes.centres[i, axis] + count * step[axis]
-        more = _off_bounds(moved, step, room)
+                moved[i, axis] = boxes[i, axis] + count * step[axis]
+        more = _off_bounds(moved, step, table, reds)
         if more == _FOR_GOOD:
             return -1
+        if more == 0:  # what was met a step ago is probably met once more
+            more, latest = steps_past(ends, ways, latest, moved, swept, step)
         if more == 0:
-            more, latest = _steps_off_ways(moved, step, latest, room)
-        if more == 0:
-            more = steps_off(moved, room.reds, _TARGET_GAP, step)
+            more = steps_off(moved, reds, _TARGET_GAP, step)
         if more == 0:
             return count
         count += more
     return -1
 
 
-@njit(cache=True)
-def _steps_off_ways(boxes: BoxSet, step: FloatArray, latest: int, room: Room) -> tuple[int, int]:
-    """Number of steps to a place that may be off the free ways, 0 if this one is, and the way that is met.
-
-    The way with index ``latest`` is looked at first.
-    """
-    ways = len(room.ways)
-    for pair in range(len(room.ends) * ways):
-        way = (latest + pair) % (len(room.ends) * ways)
-        more = steps_past(room.ends[way // ways], room.ways[way % ways], boxes, room.swept, step)
-        if more > 0:
-            return more, way
-    return 0, latest
-
-
 def holds(room: Room, boxes: BoxSet) -> bool:
     """Whether an obstacle has room where it is."""
-    return steps_to_room(boxes, np.zeros(3), 0, room) == 0
+    return steps_to_room(packed(boxes), (0.0, 0.0, 0.0), 0, room) == 0
 
 
 @njit(cache=True)
-def _off_bounds(boxes: BoxSet, step: FloatArray, room: Room) -> int:
+def _off_bounds(boxes: FloatArray, step: Triple, table: FloatArray, reds: FloatArray) -> int:
     """0 if boxes are above the table, and within ``_ORBIT`` of the target if the hand might meet them there.
 
     ``_FOR_GOOD`` if they are beside the table, where further steps do not bring them back; 1 if they are out otherwise.
     """
-    low, high, table, target = np.empty(3), np.empty(3), room.table, room.reds.centres[0]
     out = 0
-    for i in range(len(boxes.centres)):
+    for i in range(len(boxes)):
+        x, y, high = 0.0, 0.0, 0.0
         for axis in range(3):
             reach = 0.0
             for k in range(3):
-                reach += abs(boxes.rotations[i, axis, k]) * boxes.halves[i, k]
-            low[axis], high[axis] = boxes.centres[i, axis] - reach, boxes.centres[i, axis] + reach
-        for axis in range(2):
-            if low[axis] < table[axis, 0]:
-                out = max(out, _FOR_GOOD if step[axis] <= 0.0 else 1)
-            if high[axis] > table[axis, 1]:
-                out = max(out, _FOR_GOOD if step[axis] >= 0.0 else 1)
-        x = max(abs(low[0] - target[0]), abs(high[0] - target[0]))
-        y = max(abs(low[1] - target[1]), abs(high[1] - target[1]))
-        across, rise = math.hypot(x, y), high[2] - target[2]
+                reach += abs(boxes[i, 6 + 3 * axis + k]) * boxes[i, 3 + k]
+            low, high = boxes[i, axis] - reach, boxes[i, axis] + reach
+            if axis < 2:
+                if low < table[axis, 0]:
+                    out = max(out, _FOR_GOOD if step[axis] <= 0.0 else 1)
+                if high > table[axis, 1]:
+                    out = max(out, _FOR_GOOD if step[axis] >= 0.0 else 1)
+                x, y = y, max(abs(low - reds[0, axis]), abs(high - reds[0, axis]))
+        rise = high - reds[0, 2]
+        if rise <= 0.0 or rise * rise < 0.99 * _FLAT**2 * (x * x + y * y):
+            continue  # surely flat, as most are; the lengths take longer
+        across = math.hypot(x, y)
         if rise > _FLAT * across and math.hypot(across, rise) > _ORBIT:
             out = max(out, 1)
     return out

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fixation_gym.control.box_tests import any_meets, boxes_meet, meets
+from fixation_gym.control.box_tests import any_meets, boxes_meet
 from fixation_gym.control.corridor import free_directions, hand_axes, hand_boxes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import SCENARIOS, Scenario
@@ -99,7 +99,7 @@ def test_no_habit_is_worth_having(name):
     for scene in found:
         end = scene.target.places[-1]
         boxes = still_boxes(scene)
-        opened += [not meets(end, hand, boxes, smaller) for hand in hand_axes(reachable_directions(end))]
+        opened += ~any_meets(end, hand_axes(reachable_directions(end)), boxes, smaller)
     assert opened.max() <= 12, f"way {np.degrees(REACH_GRID[opened.argmax()])} is open in {opened.max()} of 16 scenes"
 
 
