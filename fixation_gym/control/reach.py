@@ -37,6 +37,7 @@ def _grid() -> FloatArray:
 REACH_GRID: FloatArray = _grid()
 """Azimuths, against the target's bearing, and elevations that cover the reach evenly, shape (n, 2), rad."""
 REACH_GRID.setflags(write=False)
+_FLAT, _RISE = -np.cos(REACH_GRID[:, 1]), np.sin(REACH_GRID[:, 1])
 
 
 def directions(angles: FloatArray, target: FloatArray) -> FloatArray:
@@ -56,4 +57,6 @@ def directions(angles: FloatArray, target: FloatArray) -> FloatArray:
 
 def reachable_directions(target: FloatArray) -> FloatArray:
     """Unit vectors from the target to cameras all over the arm's reach, shape (n, 3), in base."""
-    return directions(REACH_GRID, target)
+    azimuth, ways = math.atan2(target[1], target[0]) + REACH_GRID[:, 0], np.empty((len(REACH_GRID), 3))
+    ways[:, 0], ways[:, 1], ways[:, 2] = _FLAT * np.cos(azimuth), _FLAT * np.sin(azimuth), _RISE
+    return ways

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
 from fixation_gym.control.box_tests import boxes_meet, packed, packed_hand, pairs_that_meet
-from fixation_gym.control.corridor import hand_axes, hand_boxes, swept_hand
+from fixation_gym.control.corridor import hand_boxes, level_axes, swept_hand
 from fixation_gym.control.reach import REACH_GRID
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.covering import Quota, apart_from, barred_ways, could_bar, covering, is_barred
-from fixation_gym.envs.drafts import Aim, Drafts, chosen_drafts, draw_across, draw_for_ways, joined_drafts, menu_of
+from fixation_gym.envs.drafts import Aim, Drafts, Menu, chosen_drafts, draw_across, draw_for_ways, joined_drafts
 from fixation_gym.envs.goal import Goal
 from fixation_gym.envs.placement import draft_of, draw_mover
 from fixation_gym.envs.room import holds
@@ -30,6 +30,7 @@ _MOST_OPEN = 0.31
 """Largest share of the ways that is not barred in the end."""
 _ABOVE: MaskArray = REACH_GRID[:, 1] > math.radians(75.0)
 """Which ways of the reach's grid come from above."""
+_ALL_ABOVE = np.flatnonzero(_ABOVE)
 _MOST_ABOVE = 0.35
 """Largest share of them that is not barred, but for those near the free way."""
 _APART = math.radians(20.0)
@@ -83,43 +84,46 @@ class Pool:
     drafts: Drafts
     barred: MaskArray
     """Ways that each of them bars, shape (n, ways)."""
-    clashes: MaskArray
-    """Which of them have no room beside each other, shape (n, n)."""
     quota: Quota
     """How many ways may stay open in the end."""
+    several_mirrors: bool
+    """Whether a scene may have more than one."""
+
+    @cached_property
+    def clashes(self) -> MaskArray:
+        """Which of them have no room beside each other, shape (n, n): few pools get so far that this is asked."""
+        clashes = pairs_that_meet(self.drafts.boxes, self.drafts.ends, _OBSTACLE_GAP)
+        if not self.several_mirrors:  # MuJoCo draws one reflection only
+            mirrors = self.drafts.materials == _MIRROR
+            clashes |= np.outer(mirrors, mirrors)
+        return clashes
 
 
-def draw_pool(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> Pool | None:
+def draw_pool(scenario: Scenario, menu: Menu, goal: Goal, rng: np.random.Generator) -> Pool | None:
     """Obstacles that leave the free way, each as if it were alone; None if all of them together bar too little."""
-    counts = (_FIRST_CANDIDATES, _CANDIDATES)
-    drafts = draw_for_ways(counts, _BEYOND, _aim(goal), goal.room, menu_of(scenario), rng)
-    quota, hands = _quota(goal, scenario.most_open), hand_axes(goal.ways)
-    if len(drafts.kinds) == 0 or not could_bar(goal.room.ends[-1], hands, drafts, _smaller_hand(), quota):
+    drafts = draw_for_ways((_FIRST_CANDIDATES, _CANDIDATES), _BEYOND, _aim(goal), goal.room, menu, rng)
+    if len(drafts.kinds) == 0:
         return None
-    barred = barred_ways(goal.room.ends[-1], hands, drafts, _smaller_hand())
-    return _pool(drafts, barred, quota, scenario.several_mirrors)
+    quota, hands, target = _quota(goal, scenario.most_open), level_axes(goal.ways), goal.room.ends[-1]
+    if not could_bar(target, hands, drafts.boxes, drafts.ends, _smaller_hand(), quota.groups, quota.most_open):
+        return None
+    barred = barred_ways(target, hands, drafts.boxes, drafts.ends, _smaller_hand())
+    return Pool(drafts, barred, quota, scenario.several_mirrors)
 
 
-def with_some_across(scenario: Scenario, goal: Goal, view: View, pool: Pool, rng: np.random.Generator) -> Pool:
+def with_some_across(menu: Menu, goal: Goal, view: View, pool: Pool, rng: np.random.Generator) -> Pool:
     """The pool with first obstacles that the first line of sight passes through."""
-    menu = menu_of(scenario)
     drafts = draw_across(_ACROSS_TRIES, view.first_sight, _ACROSS, _aim(goal), goal.room, menu, rng)
     through = np.flatnonzero(pass_through(drafts, view.camera, goal.room.ends[0]))
     across = chosen_drafts(drafts, through[:_FIRST_CANDIDATES])
-    barred = barred_ways(goal.room.ends[-1], hand_axes(goal.ways), across, _smaller_hand())
+    hands = level_axes(goal.ways)
+    barred = barred_ways(goal.room.ends[-1], hands, across.boxes, across.ends, _smaller_hand())
     barred = np.concatenate([barred, pool.barred])
-    return _pool(joined_drafts(across, pool.drafts), barred, pool.quota, scenario.several_mirrors)
-
-
-def _pool(drafts: Drafts, barred: MaskArray, quota: Quota, several_mirrors: bool) -> Pool:
-    clashes, mirrors = pairs_that_meet(drafts.boxes, drafts.ends, _OBSTACLE_GAP), drafts.materials == _MIRROR
-    if not several_mirrors:  # MuJoCo draws one reflection only
-        clashes |= np.outer(mirrors, mirrors)
-    return Pool(drafts, barred, clashes, quota)
+    return Pool(joined_drafts(across, pool.drafts), barred, pool.quota, pool.several_mirrors)
 
 
 def _aim(goal: Goal) -> Aim:
-    return Aim(goal.room.ends[-1], goal.free.azimuth, goal.free.direction, goal.ways, np.flatnonzero(_ABOVE))
+    return Aim(goal.room.ends[-1], goal.free.azimuth, goal.free.direction, goal.ways, _ALL_ABOVE)
 
 
 @cache
@@ -134,7 +138,8 @@ def _quota(goal: Goal, most_among: float) -> Quota:
     Also of those from above, and of those among which the free one is drawn: a shelf leaves only low ways, and a hand
     that always comes in low must not find most of them open.
     """
-    groups = np.array([np.ones(len(goal.ways), bool), goal.drawn_among, _ABOVE & ~goal.near_free])
+    groups = np.ones((3, len(goal.ways)), bool)
+    groups[1], groups[2] = goal.drawn_among, _ABOVE & ~goal.near_free
     return Quota(groups, np.array([_MOST_OPEN, most_among, _MOST_ABOVE]))
 
 
@@ -145,12 +150,13 @@ def bar_ways(
 
     Those that bar most are taken, if they have room beside the others and do not hide the target.
     """
-    usable = apart_from(
-        pool.drafts.boxes, pool.drafts.ends, packed(joined([hand_boxes(view.pose), *view.taken])), _START_ROOM
-    )
-    firsts = pool.drafts.first & usable
+    if not pool.barred[:, view.first_sight].any():
+        return None
+    taken = packed(joined([hand_boxes(view.pose), *view.taken]))
+    usable = apart_from(pool.drafts.boxes, pool.drafts.ends, taken, _START_ROOM)
     if not is_barred(~np.logical_or.reduce(pool.barred[usable], axis=0), view.first_sight, pool.quota):
         return None
+    firsts = pool.drafts.first & usable
     if scenario.through_sight:
         firsts = firsts & pass_through(pool.drafts, view.camera, goal.room.ends[0])
     others = usable & ~pool.drafts.first

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from fixation_gym.control.box_tests import any_pair_meets, may_meet, meets, spheres_around
-from fixation_gym.envs.drafts import Drafts, Indices
+from fixation_gym.envs.drafts import Indices
 from fixation_gym.types import FloatArray, MaskArray
 
 
@@ -22,17 +22,26 @@ class Quota(NamedTuple):
 
 
 @njit(cache=True)
-def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: FloatArray, quota: Quota) -> bool:
+def could_bar(
+    target: FloatArray,
+    hands: FloatArray,
+    boxes: FloatArray,
+    ends: Indices,
+    smaller: FloatArray,
+    groups: MaskArray,
+    most_open: FloatArray,
+) -> bool:
     """Whether all drafts together would bar enough; most do not, which is soon known.
 
     Args:
         target: in base, shape (3,), m.
         hands: axes of the hand on all ways, shape (n, 3, 3).
-        drafts: the obstacles.
+        boxes: of all drafts, as in ``box_tests.packed``.
+        ends: those of draft i are the boxes from ``ends[i]`` to ``ends[i + 1]``.
         smaller: what a hand sweeps that is smaller than the real one, as in ``box_tests.packed_hand``.
-        quota: how many ways may stay open.
+        groups: of ways, as in ``Quota``.
+        most_open: largest share of each group that is not barred.
     """
-    groups, most_open, boxes, ends = quota.groups, quota.most_open, drafts.boxes, drafts.ends
     sizes, counts = np.zeros(len(groups), np.int64), np.zeros(len(groups), np.int64)
     for group in range(len(groups)):
         for way in range(len(hands)):
@@ -55,9 +64,10 @@ def could_bar(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: Fl
 
 
 @njit(cache=True)
-def barred_ways(target: FloatArray, hands: FloatArray, drafts: Drafts, smaller: FloatArray) -> MaskArray:
+def barred_ways(
+    target: FloatArray, hands: FloatArray, boxes: FloatArray, ends: Indices, smaller: FloatArray
+) -> MaskArray:
     """Ways that each of n drafts bars, shape (n, ways); arguments as above."""
-    boxes, ends = drafts.boxes, drafts.ends
     barred, spheres = np.zeros((len(ends) - 1, len(hands)), np.bool_), spheres_around(boxes, ends)
     for index in range(len(spheres)):
         for way in range(len(hands)):

@@ -110,8 +110,9 @@ def joined_drafts(first: Drafts, second: Drafts) -> Drafts:
 
 def chosen_drafts(drafts: Drafts, chosen: Indices) -> Drafts:
     """Some of them, in the order of their indices."""
-    counts = np.diff(drafts.ends)
-    parts = np.isin(np.repeat(np.arange(len(counts)), counts), chosen)
+    counts, wanted = np.diff(drafts.ends), np.zeros(len(drafts.kinds), bool)
+    wanted[chosen] = True
+    parts = np.repeat(wanted, counts)
     return Drafts(
         drafts.kinds[chosen],
         drafts.materials[chosen],

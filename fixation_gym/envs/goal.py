@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
-from fixation_gym.control.box_tests import packed, packed_hand
+from fixation_gym.control.box_tests import BOX_COLUMNS, packed_hand
 from fixation_gym.control.corridor import hand_axes, level_axes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, reachable_directions
 from fixation_gym.envs.config import Scenario
@@ -16,20 +16,23 @@ from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.placement import sample_push
 from fixation_gym.envs.room import FREE_ROOM, Room
 from fixation_gym.envs.scene import TargetSpec
-from fixation_gym.geometry.boxes import BoxSet, box_set
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, MaskArray
 
 _CONE = math.radians(5.0)
 """Half angle of the cone of free ways, rad."""
-_AROUND = np.array([(math.cos(angle), math.sin(angle)) for angle in np.radians(range(0, 360, 60))])
-"""Where the rim of the cone is, shape (n, 2)."""
+_AROUND = [(math.cos(angle), math.sin(angle)) for angle in np.radians(range(0, 360, 60))]
+_FREE_CONE = np.array(
+    [(0.0, 0.0, -1.0), *((math.sin(_CONE) * x, math.sin(_CONE) * y, -math.cos(_CONE)) for x, y in _AROUND)]
+)
+"""Axis and rim of the cone in the axes of a camera on the free way, shape (n, 3)."""
 _NEAR_FREE = math.radians(12.0)
 """Ways this near to the free one need not be barred, rad."""
 _LARGEST_ROLL, _LOW_ROLL = math.radians(45.0), math.radians(20.0)
 """Largest turn of the hand that a grasp may need on a steep free way and on a low one, rad."""
 _SIDED = ("box", "duck")
 """Targets that the fingers can close on from some sides only."""
+_TABLE, _SWEPT = np.array(ROBOT.workspace.table), packed_hand(swept_hand(FREE_ROOM))
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Way:
     elevation: float
     """Above the table, rad."""
 
-    @property
+    @cached_property
     def direction(self) -> FloatArray:
         """Unit vector from the target to a camera on that way, shape (3,), in base."""
         flat = -math.cos(self.elevation)
@@ -69,7 +72,8 @@ def sample_goal(scenario: Scenario, free_angles: tuple[float, float], rng: np.ra
     if scenario.target_moves:
         target = _pushed(target, scenario, rng)
     free = Way(math.atan2(target.position[1], target.position[0]) + free_angles[0], free_angles[1])
-    target = replace(target, yaw=_grasped_yaw(target, free, rng))
+    if target.shape in _SIDED:
+        target = replace(target, yaw=_grasped_yaw(target, free, rng))
     room = _room(target, free)
     ways = reachable_directions(room.ends[-1])
     near_free = ways @ free.direction > math.cos(_NEAR_FREE)
@@ -110,12 +114,10 @@ def _pushed(target: TargetSpec, scenario: Scenario, rng: np.random.Generator) ->
 
 
 def _grasped_yaw(target: TargetSpec, free: Way, rng: np.random.Generator) -> float:
-    """A yaw at which the fingers can close on the target from the free way; what is round may stand as it likes.
+    """A yaw at which the fingers can close on a target with sides from the free way.
 
     Flat fingers that are turned far would touch the table, so the lower the way the less the hand may turn.
     """
-    if target.shape not in _SIDED:
-        return target.yaw
     steepness = (free.elevation - math.radians(45.0)) / math.radians(25.0)
     most = _LOW_ROLL + (_LARGEST_ROLL - _LOW_ROLL) * min(max(steepness, 0.0), 1.0)
     # The fingers open along the image's x axis, which lies across the way, as does the target's y axis at this yaw.
@@ -126,22 +128,24 @@ def _grasped_yaw(target: TargetSpec, free: Way, rng: np.random.Generator) -> flo
 
 def _room(target: TargetSpec, free: Way) -> Room:
     """What obstacles must keep clear of: the target and a cone of free ways, its axis also for a turned hand."""
-    axis, places, box = free.direction, target.places, box_set([target.box])
-    right, down, _ = level_axes(axis[None])[0]
-    rim = math.cos(_CONE) * axis + math.sin(_CONE) * (_AROUND @ [right, down])
-    ways = level_axes(np.vstack([axis, rim]))
-    turns = _grasp_turns(target, free)
-    if turns:
-        ways = np.concatenate([ways, hand_axes(axis[None], np.array(turns))])
+    level, places = level_axes(free.direction[None])[0], target.places
+    turn = _grasp_turn(target, free)
+    ways = np.empty((len(_FREE_CONE) + (turn is not None), 3, 3))
+    ways[: len(_FREE_CONE)] = level_axes(_FREE_CONE @ level)
+    if turn is not None:
+        ways[-1] = hand_axes(free.direction[None], np.array([turn]))[0]
     ends = places[[0, -1]] if target.motion else places[:1]
-    reds = BoxSet(places, box.rotations.repeat(len(places), axis=0), box.halves.repeat(len(places), axis=0))
-    table = ROBOT.workspace
-    return Room(table.table_height, np.array(table.table), packed(reds), ends, ways, packed_hand(swept_hand(FREE_ROOM)))
+    c, s = math.cos(target.yaw), math.sin(target.yaw)
+    reds = np.empty((len(places), BOX_COLUMNS))
+    reds[:, :3] = places
+    reds[:, 3:6] = target.half_extent
+    reds[:, 6:] = c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0
+    return Room(ROBOT.workspace.table_height, _TABLE, reds, ends, ways, _SWEPT)
 
 
-def _grasp_turns(target: TargetSpec, free: Way) -> list[float]:
-    """Turn of the hand about its axis that the grasp of a target with sides needs, rad; none for what is round."""
+def _grasp_turn(target: TargetSpec, free: Way) -> float | None:
+    """Turn of the hand about its axis that the grasp of a target with sides needs, rad; None for what is round."""
     if target.shape not in _SIDED:
-        return []
+        return None
     period = math.pi / 2 if target.shape == "box" else math.pi
-    return [(free.azimuth - target.yaw + period / 2) % period - period / 2]
+    return (free.azimuth - target.yaw + period / 2) % period - period / 2

@@ -33,6 +33,9 @@ TARGET_SHAPES: tuple[Shape, ...] = (
 )
 
 
+_BY_NAME = {shape.name: shape for shape in TARGET_SHAPES}
+
+
 def target_shape(name: str) -> Shape:
     """The target shape of that name."""
-    return next(shape for shape in TARGET_SHAPES if shape.name == name)
+    return _BY_NAME[name]

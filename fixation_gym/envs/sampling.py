@@ -19,6 +19,7 @@ from fixation_gym.control.corridor import free_directions
 from fixation_gym.control.reach import sample_direction
 from fixation_gym.envs.barriers import View, add_movers, bar_ways, draw_pool, with_some_across
 from fixation_gym.envs.config import Scenario
+from fixation_gym.envs.drafts import Menu, menu_of
 from fixation_gym.envs.goal import Goal, Way, sample_goal, sample_target
 from fixation_gym.envs.looks import TABLE_TEXTURES, dressed
 from fixation_gym.envs.pool_slots import fits_pool
@@ -47,8 +48,9 @@ def sample_scene(scenario: Scenario, rng: np.random.Generator) -> SceneSpec:
         RuntimeError: if the scenario leaves no room for such a scene.
     """
     scenario = _with_events_drawn(scenario, rng)
+    menu = menu_of(scenario)
     for free in _free_ways(scenario, rng):
-        scene = _propose(scenario, free, rng)
+        scene = _propose(scenario, menu, free, rng)
         if scene is not None:
             return scene
     raise RuntimeError(
@@ -82,10 +84,12 @@ def _with_events_drawn(scenario: Scenario, rng: np.random.Generator) -> Scenario
     )
 
 
-def _propose(scenario: Scenario, free: tuple[float, float], rng: np.random.Generator) -> SceneSpec | None:
+def _propose(
+    scenario: Scenario, menu: Menu, free: tuple[float, float], rng: np.random.Generator
+) -> SceneSpec | None:
     goal = sample_goal(scenario, free, rng)
     crowded = scenario.obstacle_count[1] + scenario.moving_count[1] > 0
-    pool = draw_pool(scenario, goal, rng) if crowded else None
+    pool = draw_pool(scenario, menu, goal, rng) if crowded else None
     views = (_sample_view(scenario, goal, rng) for _ in range(_VIEW_DRAWS))
     if not crowded:
         view = next((view for view in views if view), None)
@@ -93,7 +97,7 @@ def _propose(scenario: Scenario, free: tuple[float, float], rng: np.random.Gener
     if pool is None:
         return None
     for view in islice((view for view in views if view and view.is_apart(goal)), _VIEWS):
-        within = with_some_across(scenario, goal, view, pool, rng) if scenario.through_sight else pool
+        within = with_some_across(menu, goal, view, pool, rng) if scenario.through_sight else pool
         barriers = bar_ways(scenario, goal, view, within, rng)
         placed = None if barriers is None else add_movers(scenario, goal, view, barriers, rng)
         if placed is not None and fits_pool(placed):
@@ -120,15 +124,17 @@ def _scene(
 
 def _sample_view(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> View | None:
     """Draw the first view, and another red thing if there is to be one; None if that does not fit."""
-    centre = np.array(goal.target.position)
+    x, y, z = goal.target.position
     reach = ROBOT.arm.reach
+    lowest, highest = (math.radians(angle) for angle in reach.start_deg)
     low, high = (math.radians(angle) for angle in scenario.view_elevation_deg)
-    azimuth, elevation = rng.uniform(*np.radians(reach.start_deg)), rng.uniform(low, high)
-    direction = Way(math.atan2(centre[1], centre[0]) + azimuth, elevation).direction
-    camera = centre + rng.uniform(*_VIEW_DISTANCE) * direction
+    azimuth, elevation = rng.uniform(lowest, highest), rng.uniform(low, high)
+    direction = Way(math.atan2(y, x) + azimuth, elevation).direction
+    camera = goal.target.position + rng.uniform(*_VIEW_DISTANCE) * direction
     if math.hypot(camera[0], camera[1]) < reach.folded:
         return None
-    gaze = centre + rng.uniform(-0.06, 0.06, 3) * [1.0, 1.0, 0.0]
+    aside = rng.uniform(-0.06, 0.06, 3)
+    gaze = np.array([x + aside[0], y + aside[1], z])
     distractor = None
     if scenario.distractor:
         distractor = _sample_distractor(scenario, goal.target, rng)

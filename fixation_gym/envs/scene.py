@@ -56,10 +56,15 @@ class TargetSpec:
     """None: plain."""
 
     @property
+    def half_extent(self) -> Vector:
+        """Half sizes of the upright box around the object, m."""
+        (x, y, z), (along, across, up) = target_shape(self.shape).half_extent, self.scale
+        return x * along, y * across, z * up
+
+    @property
     def box(self) -> Box:
         """Upright box around the object at reset, in base."""
-        half = np.array(target_shape(self.shape).half_extent) * self.scale
-        return Box(np.array(self.position), half, self.yaw)
+        return Box(np.array(self.position), np.array(self.half_extent), self.yaw)
 
     @property
     def places(self) -> FloatArray:
