@@ -46,13 +46,15 @@ def could_bar(
     for group in range(len(groups)):
         for way in range(len(hands)):
             sizes[group] += groups[group, way]
-    spheres = spheres_around(boxes, ends)
+    spheres, latest, met = spheres_around(boxes, ends), 0, False
     for way in range(len(hands) - 1, -1, -1):  # those from above come last, and are the hardest to bar
-        met = False
-        for index in range(len(spheres)):
-            if may_meet(target, hands, way, spheres, index, smaller):
-                met |= meets(target, hands, way, boxes, ends[index], ends[index + 1], smaller)
+        for turn in range(len(spheres)):
+            index = (latest + turn) % len(spheres)  # what bars a way probably bars the next one, too
+            met = may_meet(target, hands, way, spheres, index, smaller) and meets(
+                target, hands, way, boxes, ends[index], ends[index + 1], smaller
+            )
             if met:
+                latest = index
                 break
         if met:
             continue
