@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fixation_gym.control.box_tests import BOX_COLUMNS, Triple
+from fixation_gym.control.box_tests import BOX_COLUMNS
+from fixation_gym.envs.beyond import beyond
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.obstacle_kinds import OBSTACLE_KINDS, kinds_of
 from fixation_gym.envs.obstacle_parts import write_parts
@@ -202,7 +203,7 @@ def _draw(
     rng: np.random.Generator,
 ) -> int:
     """Draw an obstacle beyond ``way``, as near to the target as the free ways allow; returns 1 if it has room, or 0."""
-    x, y, steepness = _beyond(aim.free, way, uniform(rng, past[0], past[1]))
+    x, y, steepness = beyond(aim.free, way, uniform(rng, past[0], past[1]))
     choice = 0 if first else below(rng, len(menu.materials))
     kinds = menu.kinds[int(first), choice]
     suitable = _suitable_kind(menu, kinds, steepness, len(kinds))[1]
@@ -265,44 +266,3 @@ def _place(rows: FloatArray, origin: FloatArray, facing: float, boxes: FloatArra
         boxes[i, 6], boxes[i, 7], boxes[i, 8] = cy * cp, -sy, cy * sp
         boxes[i, 9], boxes[i, 10], boxes[i, 11] = sy * cp, cy, sy * sp
         boxes[i, 12], boxes[i, 13], boxes[i, 14] = -sp, 0.0, cp
-
-
-@njit(cache=True)
-def _beyond(free: FloatArray, way: FloatArray, angle: float) -> Triple:
-    """The direction that lies beyond ``way``, seen from the free one, by ``angle`` rad, but above the table.
-
-    What stands there bars the way without being in the free one: the hand is wide.
-    """
-    along = way[0] * free[0] + way[1] * free[1] + way[2] * free[2]
-    across = (way[0] - along * free[0], way[1] - along * free[1], way[2] - along * free[2])
-    total = math.acos(min(max(along, -1.0), 1.0)) + angle
-    share, aside = math.cos(total), math.sin(total) / max(_hypot(across), 1e-9)
-    x, y = share * free[0] + aside * across[0], share * free[1] + aside * across[1]
-    z = max(share * free[2] + aside * across[2], 0.05)
-    length = _hypot((x, y, z))
-    return x / length, y / length, z / length
-
-
-@njit(cache=True)
-def _hypot(vector: Triple) -> float:
-    """The length to the last bit, like ``math.hypot``, which numba knows for two numbers only."""
-    total, rest = 0.0, 0.0
-    for value in vector:
-        square, error = _square(value)
-        larger = total + square
-        rest += error + (total - (larger - (larger - total))) + (square - (larger - total))
-        total = larger
-    length = math.sqrt(total + rest)
-    if length == 0.0:
-        return 0.0
-    square, error = _square(length)
-    return length + (total - square - error + rest) / (2.0 * length)
-
-
-@njit(cache=True)
-def _square(value: float) -> tuple[float, float]:
-    """Square of a number, and the error of its rounding (Dekker)."""
-    large = value * 134217729.0  # 2 ** 27 + 1
-    high = large - (large - value)
-    low, square = value - high, value * value
-    return square, high * high - square + 2.0 * high * low + low * low

@@ -35,6 +35,12 @@ _SIDED = ("box", "duck")
 _TABLE, _SWEPT = np.array(ROBOT.workspace.table), packed_hand(swept_hand(FREE_ROOM))
 
 
+def direction_of(azimuth: float, elevation: float) -> FloatArray:
+    """Unit vector from the target to a camera on a way, as in ``Way``, shape (3,), in base."""
+    flat = -math.cos(elevation)
+    return np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
+
+
 @dataclass(frozen=True)
 class Way:
     """A straight way of the hand to the target: from where it comes."""
@@ -47,8 +53,7 @@ class Way:
     @cached_property
     def direction(self) -> FloatArray:
         """Unit vector from the target to a camera on that way, shape (3,), in base."""
-        flat = -math.cos(self.elevation)
-        return np.array([flat * math.cos(self.azimuth), flat * math.sin(self.azimuth), math.sin(self.elevation)])
+        return direction_of(self.azimuth, self.elevation)
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,6 +89,8 @@ def _table_of_things() -> tuple[FloatArray, FloatArray]:
 
 
 _THINGS, _HALF_HEIGHTS = _table_of_things()
+_WALLS = np.array([1, 2])
+"""Numbers of side walls of a niche."""
 _THING_COUNTS = np.array([len(THINGS[name]) for name in MATERIALS])
 
 
@@ -103,7 +105,7 @@ def _thing(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
                 rows[count, column] = row[column] * scale if column < YAW else row[column]
             count += 1
     most = 0.35 if material in (MIRROR, TRANSLUCENT) else 3.1
-    turn(rows, 0, count, uniform(rng, -most, most), _HALF_HEIGHTS[material, shape] * scale)
+    turn(rows[:count], uniform(rng, -most, most), _HALF_HEIGHTS[material, shape] * scale)
     return count
 
 
@@ -198,7 +200,7 @@ def _cabinet(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
 def _niche(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """Three walls in a U, or two in an L, without a roof."""
     half_x, half_y, top = uniform(rng, 0.08, 0.11), uniform(rng, 0.12, 0.16), uniform(rng, 0.12, 0.26)
-    walls = 1 + below(rng, 2)
+    walls = _WALLS[below(rng, len(_WALLS))]
     first = write_pane(rows, 0, material, half_y, 0.5 * top, -half_x, 0.0, 0.5 * top, 0.0)
     count = sides(rows, first, _second(material), half_x, half_y, top, 0.0)
     if walls == 1:

@@ -38,6 +38,7 @@ _BOARD_FINISHES = np.array([_BOARDS.get(material, (0.0, 0))[1] for material in r
 _RIM_WIDTH = 0.005
 """Half width of the rims of panes, m."""
 _FOOT_DENSITY = 8.0
+_SIGNS = np.array([-1.0, 1.0])
 
 
 def rows_of(parts: Sequence[Part]) -> FloatArray:
@@ -140,13 +141,13 @@ def uniform(rng: np.random.Generator, low: float, high: float) -> float:
 @njit(cache=True)
 def below(rng: np.random.Generator, count: int) -> int:
     """A whole number from 0 on and less than ``count``, compiled once, too."""
-    return rng.integers(0, count)
+    return int(rng.integers(0, count))
 
 
 @njit(cache=True)
 def either_sign(rng: np.random.Generator) -> float:
     """-1 or 1."""
-    return 2.0 * below(rng, 2) - 1.0
+    return _SIGNS[below(rng, len(_SIGNS))]
 
 
 @njit(cache=True)
@@ -164,13 +165,13 @@ def foot(rows: FloatArray, count: int, x: float, y: float, half_x: float, half_y
 
 
 @njit(cache=True)
-def turn(rows: FloatArray, first: int, count: int, angle: float, rise: float) -> None:
-    """Turn the rows from ``first`` on about the vertical, and raise them."""
+def turn(rows: FloatArray, angle: float, rise: float) -> None:
+    """Turn all rows about the vertical, and raise them."""
     c, s = math.cos(angle), math.sin(angle)
-    for row in rows[first:count]:
-        x, y = row[0], row[1]
-        row[0], row[1], row[2] = c * x - s * y, s * x + c * y, row[2] + rise
-        row[YAW] += angle
+    for i in range(len(rows)):
+        x, y = rows[i, 0], rows[i, 1]
+        rows[i, 0], rows[i, 1], rows[i, 2] = c * x - s * y, s * x + c * y, rows[i, 2] + rise
+        rows[i, YAW] += angle
 
 
 @njit(cache=True)
@@ -179,9 +180,9 @@ def sides(rows: FloatArray, count: int, material: int, half_x: float, half_y: fl
     for side in (-1.0, 1.0):
         first = count
         count = write_pane(rows, count, material, half_x, 0.5 * top, 0.0, 0.0, 0.5 * top, 0.0)
-        turn(rows, first, count, math.pi / 2, 0.0)
-        for row in rows[first:count]:
-            row[0], row[1] = row[0] + shift, row[1] + side * half_y
+        turn(rows[first:count], math.pi / 2, 0.0)
+        for i in range(first, count):
+            rows[i, 0], rows[i, 1] = rows[i, 0] + shift, rows[i, 1] + side * half_y
     return count
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
 
-from fixation_gym.control.box_tests import Triple, packed, steps_off, steps_past
+from fixation_gym.control.box_pairs import Triple
+from fixation_gym.control.box_tests import packed, steps_off, steps_past
 from fixation_gym.geometry.boxes import BoxSet
 from fixation_gym.types import FloatArray
 

@@ -20,7 +20,7 @@ from fixation_gym.control.reach import sample_direction
 from fixation_gym.envs.barriers import View, add_movers, bar_ways, draw_pool, with_some_across
 from fixation_gym.envs.config import Scenario
 from fixation_gym.envs.drafts import Menu, menu_of
-from fixation_gym.envs.goal import Goal, Way, sample_goal, sample_target
+from fixation_gym.envs.goal import Goal, direction_of, sample_goal, sample_target
 from fixation_gym.envs.looks import TABLE_TEXTURES, dressed
 from fixation_gym.envs.pool_slots import fits_pool
 from fixation_gym.envs.room import FREE_ROOM
@@ -84,9 +84,7 @@ def _with_events_drawn(scenario: Scenario, rng: np.random.Generator) -> Scenario
     )
 
 
-def _propose(
-    scenario: Scenario, menu: Menu, free: tuple[float, float], rng: np.random.Generator
-) -> SceneSpec | None:
+def _propose(scenario: Scenario, menu: Menu, free: tuple[float, float], rng: np.random.Generator) -> SceneSpec | None:
     goal = sample_goal(scenario, free, rng)
     crowded = scenario.obstacle_count[1] + scenario.moving_count[1] > 0
     pool = draw_pool(scenario, menu, goal, rng) if crowded else None
@@ -129,7 +127,7 @@ def _sample_view(scenario: Scenario, goal: Goal, rng: np.random.Generator) -> Vi
     lowest, highest = (math.radians(angle) for angle in reach.start_deg)
     low, high = (math.radians(angle) for angle in scenario.view_elevation_deg)
     azimuth, elevation = rng.uniform(lowest, highest), rng.uniform(low, high)
-    direction = Way(math.atan2(y, x) + azimuth, elevation).direction
+    direction = direction_of(math.atan2(y, x) + azimuth, elevation)
     camera = goal.target.position + rng.uniform(*_VIEW_DISTANCE) * direction
     if math.hypot(camera[0], camera[1]) < reach.folded:
         return None
