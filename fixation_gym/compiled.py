@@ -1,4 +1,4 @@
-"""``compiled``: numba's ``njit``, with a cache on disk that sees changes in all files that a function depends on.
+"""``compiled`` and ``compiled_fast``: numba's ``njit``, with a cache that sees all files a function depends on.
 
 numba looks at a function's own file alone. When another file changes, as by ``git pull``, with a function that is
 called or a constant that is used, the old machine code would run on: with old results, or with a crash if the layout
@@ -15,18 +15,34 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from numba import njit
+import numba
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _IMPORT = re.compile(r"^(?:from|import) ([\w.]+)", re.MULTILINE)
+_FAST = {"nogil": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
 
 
 def compiled(function: _Function) -> _Function:
-    """Decorator: the function is compiled when it is first called with arguments of some types, and kept on disk."""
-    dispatcher = njit(cache=True)(function)
+    """Decorator: the function is compiled at the first call with arguments of some types, and kept on disk.
+
+    The code lies beside the source, or else in numba's cache directory, or nowhere if there is no place.
+    """
+    return _compiled(function)
+
+
+def compiled_fast(function: _Function) -> _Function:
+    """The same, but sums may be reordered and multiply-adds fused; NaN and inf keep their meaning."""
+    return _compiled(function, **_FAST)
+
+
+def _compiled(function: Any, **options: Any) -> Any:
+    try:
+        dispatcher = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no place on disk to cache in
+        return numba.njit(**options)(function)
     module = function.__module__
     file = getattr(sys.modules.get(module), "__file__", None)
-    kept = getattr(dispatcher._cache, "_cache_file", None)  # None where numba has no place to write
+    kept = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if file is not None and kept is not None:
         # All that numba compares before it takes what is kept; there is no public way to say more.
         kept._source_stamp = (kept._source_stamp, _sources_hash(module, Path(file)))

@@ -3,7 +3,10 @@
 import subprocess
 import sys
 
+import numba
 import pytest
+
+from fixation_gym.compiled import compiled
 
 CALLEE = """
 from fixation_gym.compiled import compiled
@@ -48,3 +51,15 @@ def test_a_change_in_another_file_is_seen_and_no_change_is_not(package, change):
     (package / "made_up" / "inner" / "callee.py").write_text(CALLEE.format(**change))
     assert run(package) == (10.0 * change["factor"] + change["offset"], 0)
     assert run(package) == (10.0 * change["factor"] + change["offset"], 1)
+
+
+def test_functions_are_compiled_where_nothing_can_be_kept(monkeypatch):
+    njit = numba.njit
+
+    def without_a_place(cache=False, **options):
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return njit(**options)
+
+    monkeypatch.setattr(numba, "njit", without_a_place)
+    assert compiled(lambda x: x + 1)(1) == 2

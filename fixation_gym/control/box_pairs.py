@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.types import FloatArray
 
 SLACK = 1e-6
@@ -23,19 +23,19 @@ Triples = tuple[Triple, Triple, Triple]
 NOWHERE = (0.0, 0.0, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def at(place: FloatArray) -> Triple:
     """A place, shape (3,), as plain numbers."""
     return place[0], place[1], place[2]
 
 
-@njit(cache=True)
+@compiled
 def row(array: FloatArray, i: int, column: int) -> Triple:
     """Three numbers of a row of an array, (n, columns)."""
     return array[i, column], array[i, column + 1], array[i, column + 2]
 
 
-@njit(cache=True)
+@compiled
 def axes_of(axes: FloatArray, i: int) -> Triples:
     """One of some matrices, (n, 3, 3)."""
     return (
@@ -45,62 +45,62 @@ def axes_of(axes: FloatArray, i: int) -> Triples:
     )
 
 
-@njit(cache=True)
+@compiled
 def rotation_of(boxes: FloatArray, i: int) -> Triples:
     """Rows of the rotation of a box, as in ``packed``."""
     return row(boxes, i, 6), row(boxes, i, 9), row(boxes, i, 12)
 
 
-@njit(cache=True)
+@compiled
 def columns(boxes: FloatArray, i: int) -> Triples:
     """Columns of the rotation of a box."""
     (a, b, c), (d, e, f), (g, h, k) = rotation_of(boxes, i)
     return (a, d, g), (b, e, h), (c, f, k)
 
 
-@njit(cache=True)
+@compiled
 def length(vector: Triple) -> float:
     """Euclidean."""
     return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
-@njit(cache=True)
+@compiled
 def difference(first: Triple, second: Triple) -> Triple:
     """The first one minus the second one."""
     return first[0] - second[0], first[1] - second[1], first[2] - second[2]
 
 
-@njit(cache=True)
+@compiled
 def distance(first: FloatArray, i: int, second: FloatArray, j: int) -> float:
     """Between places at the beginning of rows of two arrays, m."""
     return length(difference(row(first, i, 0), row(second, j, 0)))
 
 
-@njit(cache=True)
+@compiled
 def widened(half: Triple, gap: float) -> Triple:
     """Half sizes with some room on all sides, m."""
     return half[0] + gap, half[1] + gap, half[2] + gap
 
 
-@njit(cache=True)
+@compiled
 def _dot(first: Triple, second: Triple) -> float:
     return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
-@njit(cache=True)
+@compiled
 def turned(frame: Triples, place: Triple, origin: Triple) -> Triple:
     """A place in the frame at ``origin`` whose axes are the rows of ``frame``."""
     offset = difference(place, origin)
     return _dot(frame[0], offset), _dot(frame[1], offset), _dot(frame[2], offset)
 
 
-@njit(cache=True)
+@compiled
 def turned_axes(frame: Triples, rotation: Triples) -> Triples:
     """Rows of a rotation in the frame whose axes are the rows of ``frame``."""
     return _product(frame[0], rotation), _product(frame[1], rotation), _product(frame[2], rotation)
 
 
-@njit(cache=True)
+@compiled
 def _product(row: Triple, rotation: Triples) -> Triple:
     (a, b, c), (first, second, third) = row, rotation
     return (
@@ -110,7 +110,7 @@ def _product(row: Triple, rotation: Triples) -> Triple:
     )
 
 
-@njit(cache=True)
+@compiled
 def is_outside(place: Triple, low: Triple, high: Triple, margin: float) -> bool:
     """Whether a place is farther than ``margin`` m from the box between two corners, along one of its axes."""
     outside = False
@@ -119,13 +119,13 @@ def is_outside(place: Triple, low: Triple, high: Triple, margin: float) -> bool:
     return outside
 
 
-@njit(cache=True)
+@compiled
 def reach(row: Triple, half: Triple) -> float:
     """Half width of a box along an axis that has the components ``row`` in its frame, with some slack, m."""
     return abs(row[0]) * half[0] + abs(row[1]) * half[1] + abs(row[2]) * half[2] + SLACK
 
 
-@njit(cache=True)
+@compiled
 def is_beyond(offset: Triple, reach: Triple, half: Triple) -> bool:
     """Whether what reaches so far is surely apart from an aligned box at the origin, as most boxes are."""
     return (
@@ -135,7 +135,7 @@ def is_beyond(offset: Triple, reach: Triple, half: Triple) -> bool:
     )
 
 
-@njit(cache=True)
+@compiled
 def meets_aligned(offset: Triple, rotation: Triples, half: Triple, aligned: Triple) -> bool:
     """Whether a turned box meets an aligned one at the origin (separating axes, Gottschalk).
 
@@ -172,7 +172,7 @@ def meets_aligned(offset: Triple, rotation: Triples, half: Triple, aligned: Trip
     )
 
 
-@njit(cache=True)
+@compiled
 def steps_apart(offset: Triple, shift: Triple, rotation: Triples, half: Triple, aligned: Triple) -> int:
     """Number of steps after which two boxes that meet, as above, may do so no more: 1 or more.
 
@@ -198,7 +198,7 @@ def steps_apart(offset: Triple, shift: Triple, rotation: Triples, half: Triple, 
     return max(1, math.ceil(last))
 
 
-@njit(cache=True)
+@compiled
 def _overlap(along: float, speed: float, reach: float) -> float:
     """For how many steps boxes surely overlap along an axis: as long as ``along``, which grows by ``speed``, is less.
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fixation_gym.compiled import compiled
 from fixation_gym.control.box_pairs import (
     NOWHERE,
     SLACK,
@@ -81,7 +81,7 @@ def any_meets(target: FloatArray, axes: FloatArray, boxes: BoxSet, others: Align
     return np.asarray(_any_meets(target, axes, packed(boxes), packed_hand(others)))
 
 
-@njit(cache=True)
+@compiled
 def _any_meets(target: FloatArray, axes: FloatArray, boxes: FloatArray, hand: FloatArray) -> MaskArray:
     hit = np.zeros(len(axes), np.bool_)
     for camera in range(len(axes)):
@@ -89,7 +89,7 @@ def _any_meets(target: FloatArray, axes: FloatArray, boxes: FloatArray, hand: Fl
     return hit
 
 
-@njit(cache=True)
+@compiled
 def meets(
     target: FloatArray, axes: FloatArray, camera: int, boxes: FloatArray, begin: int, end: int, hand: FloatArray
 ) -> bool:
@@ -107,7 +107,7 @@ def meets(
     return _first_met(axes_of(axes, camera), at(target), boxes, begin, end, hand)[0] >= 0
 
 
-@njit(cache=True)
+@compiled
 def steps_past(
     targets: FloatArray, axes: FloatArray, latest: int, boxes: FloatArray, hand: FloatArray, step: Triple
 ) -> tuple[int, int]:
@@ -129,7 +129,7 @@ def steps_past(
     return 0, latest
 
 
-@njit(cache=True)
+@compiled
 def _first_met(
     frame: Triples, target: Triple, boxes: FloatArray, begin: int, end: int, hand: FloatArray
 ) -> tuple[int, int]:
@@ -148,14 +148,14 @@ def _first_met(
     return -1, -1
 
 
-@njit(cache=True)
+@compiled
 def may_meet(target: FloatArray, axes: FloatArray, camera: int, spheres: FloatArray, i: int, hand: FloatArray) -> bool:
     """Whether anything within a sphere, one of ``spheres_around``, could meet a box along a camera's axes."""
     place = turned(axes_of(axes, camera), row(spheres, i, 0), at(target))
     return not is_outside(place, row(hand, 0, 0), row(hand, 0, 3), spheres[i, 3] + SLACK)
 
 
-@njit(cache=True)
+@compiled
 def any_pair_meets(first: FloatArray, begin: int, end: int, second: FloatArray, gap: float) -> bool:
     """Whether one of some boxes comes nearer than about ``gap`` m to one of others; both as in ``packed``."""
     for i in range(begin, end):  # noqa: SIM110 (numba knows no generators)
@@ -164,7 +164,7 @@ def any_pair_meets(first: FloatArray, begin: int, end: int, second: FloatArray, 
     return False
 
 
-@njit(cache=True)
+@compiled
 def steps_off(first: FloatArray, second: FloatArray, gap: float, step: Triple) -> int:
     """Number of steps, m, that surely leave the first boxes so near to the second ones, and one more.
 
@@ -180,7 +180,7 @@ def steps_off(first: FloatArray, second: FloatArray, gap: float, step: Triple) -
     return 0
 
 
-@njit(cache=True)
+@compiled
 def _one_met(first: FloatArray, i: int, second: FloatArray, begin: int, end: int, gap: float) -> int:
     """Index of one of the second boxes that comes so near to one of the first; -1 if none does."""
     centre, half, frame = row(first, i, 0), widened(row(first, i, 3), gap), columns(first, i)
@@ -194,7 +194,7 @@ def _one_met(first: FloatArray, i: int, second: FloatArray, begin: int, end: int
     return -1
 
 
-@njit(cache=True)
+@compiled
 def pairs_that_meet(boxes: FloatArray, ends: NDArray[np.int64], gap: float) -> MaskArray:
     """For n sets of boxes, which come nearer than about ``gap`` m to each other, shape (n, n).
 
@@ -216,7 +216,7 @@ def pairs_that_meet(boxes: FloatArray, ends: NDArray[np.int64], gap: float) -> M
     return meet
 
 
-@njit(cache=True)
+@compiled
 def spheres_around(boxes: FloatArray, ends: NDArray[np.int64]) -> FloatArray:
     """Middles and radii of spheres around the boxes from ``ends[i]`` to ``ends[i + 1]``, shape (n, 4), m."""
     spheres = np.zeros((len(ends) - 1, 4))

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.control.resolved_rate import DAMPING, LIMIT_GAIN, POSTURE_GAIN, JointLimits, joint_velocities
 from fixation_gym.types import FloatArray
 
@@ -55,7 +55,7 @@ class ArmTask(NamedTuple):
     """Interval between two calls, s."""
 
 
-@njit(cache=True)
+@compiled
 def camera_kinematics(arm: ArmDynamics, hand_eye: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Camera pose T_world_cam, shape (4, 4), and its twist, expressed in ``cam``, per joint velocity, shape (6, n)."""
     pose = np.zeros((4, 4))
@@ -78,7 +78,7 @@ def camera_kinematics(arm: ArmDynamics, hand_eye: FloatArray) -> tuple[FloatArra
     return pose, jacobian
 
 
-@njit(cache=True)
+@compiled
 def arm_torques(arm: ArmDynamics, task: ArmTask, twist: FloatArray, command: FloatArray, torques: FloatArray) -> None:
     """Computed-torque joint velocity control with an integrated position reference.
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.control.box_tests import Aligned, aligned, any_meets
 from fixation_gym.geometry.boxes import Box, BoxSet, box_set
 from fixation_gym.robots import ROBOT
@@ -119,7 +119,7 @@ def level_axes(directions: FloatArray) -> FloatArray:
     return _level_axes(np.ascontiguousarray(directions, dtype=np.float64))
 
 
-@njit(cache=True)
+@compiled
 def _level_axes(directions: FloatArray) -> FloatArray:
     axes = np.zeros((len(directions), 3, 3))
     for i in range(len(directions)):
@@ -133,7 +133,7 @@ def _level_axes(directions: FloatArray) -> FloatArray:
     return axes
 
 
-@njit(cache=True)
+@compiled
 def _any_holds(points: FloatArray, centres: FloatArray, halves: FloatArray) -> MaskArray:
     """Which points, shape (n, 3), are inside one of the aligned boxes."""
     inside = np.zeros(len(points), np.bool_)

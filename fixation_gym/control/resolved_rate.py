@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.types import FloatArray, MaskArray
 
 DAMPING = 0.01
@@ -33,7 +33,7 @@ class JointLimits(NamedTuple):
     """Largest joint speeds, rad/s."""
 
 
-@njit(cache=True)
+@compiled
 def joint_velocities(
     jacobian: FloatArray,
     twist: FloatArray,
@@ -85,7 +85,7 @@ def joint_velocities(
     return velocities
 
 
-@njit(cache=True)
+@compiled
 def _least_squares(
     jacobian: FloatArray, twist: FloatArray, drift: FloatArray, damping: float, held: MaskArray, velocities: FloatArray
 ) -> None:
@@ -117,7 +117,7 @@ def _least_squares(
                 velocities[k] += jacobian[i, k] * weight[i] * rest[i]
 
 
-@njit(cache=True)
+@compiled
 def _solve_in_place(matrix: FloatArray, vector: FloatArray) -> None:
     """Solve a symmetric positive definite system, of which the lower triangle is given, by Cholesky's method."""
     size = len(vector)

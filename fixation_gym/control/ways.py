@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.control.corridor import in_corridor, level_axes, swept_hand
 from fixation_gym.control.reach import REACH_GRID, directions
 from fixation_gym.robots import ROBOT
@@ -141,7 +141,7 @@ def known_ways(points: FloatArray, weights: FloatArray, target: FloatArray, seen
     return Ways(ways, evidence, seen.unseen_shares)
 
 
-@njit(cache=True)
+@compiled
 def _evidence_in(
     axes: FloatArray,
     points: FloatArray,

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from fixation_gym.compiled import compiled
 from fixation_gym.control.box_pairs import Triple
 from fixation_gym.types import FloatArray
 
 
-@njit(cache=True)
+@compiled
 def beyond(free: FloatArray, way: FloatArray, angle: float) -> Triple:
     """The direction that lies beyond ``way``, seen from the free one, by ``angle`` rad, but above the table.
 
@@ -26,7 +25,7 @@ def beyond(free: FloatArray, way: FloatArray, angle: float) -> Triple:
     return x / length, y / length, z / length
 
 
-@njit(cache=True)
+@compiled
 def _hypot(vector: Triple) -> float:
     """The length to the last bit, like ``math.hypot``, which numba knows for two numbers only."""
     total, rest = 0.0, 0.0
@@ -42,7 +41,7 @@ def _hypot(vector: Triple) -> float:
     return length + (total - square - error + rest) / (2.0 * length)
 
 
-@njit(cache=True)
+@compiled
 def _square(value: float) -> tuple[float, float]:
     """Square of a number, and the error of its rounding (Dekker)."""
     large = value * 134217729.0  # 2 ** 27 + 1

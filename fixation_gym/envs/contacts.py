@@ -8,9 +8,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fixation_gym.compiled import compiled
 from fixation_gym.envs.config import COLLISION_FORCE, TABLE_FORCE
 from fixation_gym.types import FloatArray
 
@@ -57,7 +57,7 @@ def robot_hits(model: Any, data: Any, owners: Owners) -> bool:
     return False
 
 
-@njit(cache=True)
+@compiled
 def _any_touch(geoms: Owners, owners: Owners) -> bool:
     """Whether one of the pairs of geoms, (n, 2), is of robot and obstacle or table; asked at every physics substep."""
     for pair in range(len(geoms)):
@@ -91,7 +91,7 @@ def clearance(model: Any, data: Any, robot: Owners, obstacle: Owners) -> float:
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def _gaps(positions: FloatArray, radii: FloatArray, first: Owners, second: Owners) -> FloatArray:
     """Distances between bounding spheres of geoms, shape (len(first), len(second)), m."""
     gaps = np.empty((len(first), len(second)))

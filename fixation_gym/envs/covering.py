@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.control.box_tests import any_pair_meets, may_meet, meets, spheres_around
 from fixation_gym.envs.drafts import Indices
 from fixation_gym.types import FloatArray, MaskArray
@@ -21,7 +21,7 @@ class Quota(NamedTuple):
     """Largest share of each group that is not barred, shape (n,)."""
 
 
-@njit(cache=True)
+@compiled
 def could_bar(
     target: FloatArray,
     hands: FloatArray,
@@ -65,7 +65,7 @@ def could_bar(
     return True
 
 
-@njit(cache=True)
+@compiled
 def barred_ways(
     target: FloatArray, hands: FloatArray, boxes: FloatArray, ends: Indices, smaller: FloatArray
 ) -> MaskArray:
@@ -78,7 +78,7 @@ def barred_ways(
     return barred
 
 
-@njit(cache=True)
+@compiled
 def apart_from(boxes: FloatArray, ends: Indices, others: FloatArray, gap: float) -> MaskArray:
     """Which drafts, the boxes from ``ends[i]`` to ``ends[i + 1]``, keep about ``gap`` m away from other boxes."""
     apart = np.ones(len(ends) - 1, np.bool_)
@@ -87,7 +87,7 @@ def apart_from(boxes: FloatArray, ends: Indices, others: FloatArray, gap: float)
     return apart
 
 
-@njit(cache=True)
+@compiled
 def is_barred(open_ways: MaskArray, sight: int, quota: Quota) -> bool:
     """Whether the first line of sight, the way with index ``sight``, and enough of all other ways are barred."""
     if open_ways[sight]:
@@ -99,7 +99,7 @@ def is_barred(open_ways: MaskArray, sight: int, quota: Quota) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def covering(
     first: int,
     others: MaskArray,

@@ -7,9 +7,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fixation_gym.compiled import compiled
 from fixation_gym.control.box_tests import BOX_COLUMNS
 from fixation_gym.envs.beyond import beyond
 from fixation_gym.envs.config import Scenario
@@ -126,7 +126,7 @@ def chosen_drafts(drafts: Drafts, chosen: Indices) -> Drafts:
     )
 
 
-@njit(cache=True)
+@compiled
 def draw_for_ways(
     counts: tuple[int, int], past: tuple[float, float], aim: Aim, room: Room, menu: Menu, rng: np.random.Generator
 ) -> Drafts:
@@ -153,7 +153,7 @@ def draw_for_ways(
     return _filled(drafts, kept)
 
 
-@njit(cache=True)
+@compiled
 def draw_across(
     count: int, sight: int, past: tuple[float, float], aim: Aim, room: Room, menu: Menu, rng: np.random.Generator
 ) -> Drafts:
@@ -165,7 +165,7 @@ def draw_across(
     return _filled(drafts, kept)
 
 
-@njit(cache=True)
+@compiled
 def _empty(count: int) -> Drafts:
     most = count * MOST_PARTS
     kinds, materials, first = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.bool_)
@@ -174,7 +174,7 @@ def _empty(count: int) -> Drafts:
     return Drafts(kinds, materials, first, np.empty((count, 3)), np.empty(count), ends, rows, boxes)
 
 
-@njit(cache=True)
+@compiled
 def _filled(drafts: Drafts, count: int) -> Drafts:
     """The first ``count`` of them."""
     most = drafts.ends[count]
@@ -190,7 +190,7 @@ def _filled(drafts: Drafts, count: int) -> Drafts:
     )
 
 
-@njit(cache=True)
+@compiled
 def _draw(
     drafts: Drafts,
     index: int,
@@ -235,7 +235,7 @@ def _draw(
     return 1
 
 
-@njit(cache=True)
+@compiled
 def _suitable_kind(menu: Menu, kinds: MaskArray, steepness: float, wanted: int) -> tuple[int, int]:
     """Of those of some kinds that stand around the target, or where the sine of the elevation is ``steepness``.
 
@@ -251,7 +251,7 @@ def _suitable_kind(menu: Menu, kinds: MaskArray, steepness: float, wanted: int) 
     return -1, count
 
 
-@njit(cache=True)
+@compiled
 def _place(rows: FloatArray, origin: FloatArray, facing: float, boxes: FloatArray) -> None:
     """Write the boxes around parts whose floor frame is at a place, (3,), turned by ``facing`` about the vertical."""
     c, s = math.cos(facing), math.sin(facing)

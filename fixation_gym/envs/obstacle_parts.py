@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.envs.obstacle_kinds import KIND_NAMES
 from fixation_gym.envs.part_rows import (
     COLUMNS,
@@ -52,7 +52,7 @@ def draw_parts(kind: str, material: str, rng: np.random.Generator) -> tuple[Part
     return parts_of(rows[:count])
 
 
-@njit(cache=True)
+@compiled
 def write_parts(rows: FloatArray, kind: int, material: int, rng: np.random.Generator) -> int:
     """Draw the parts of an obstacle, its kind being the index in ``KIND_NAMES``, which is the order here."""
     if kind == 0:
@@ -94,7 +94,7 @@ _WALLS = np.array([1, 2])
 _THING_COUNTS = np.array([len(THINGS[name]) for name in MATERIALS])
 
 
-@njit(cache=True)
+@compiled
 def _thing(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A block, brick, post, bottle, tumbler, framed panel, mirror or cage as it is."""
     shape, scale = below(rng, _THING_COUNTS[material]), uniform(rng, 0.8, 1.0)
@@ -109,7 +109,7 @@ def _thing(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return count
 
 
-@njit(cache=True)
+@compiled
 def _wall(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A standing board with its foot behind it."""
     half_width, half_height = uniform(rng, 0.03, 0.09), uniform(rng, 0.07, 0.16)
@@ -117,7 +117,7 @@ def _wall(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return foot(rows, count, -0.035, 0.0, 0.035, half_width)
 
 
-@njit(cache=True)
+@compiled
 def _leaning_board(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A board that leans over towards the target or away from it, on a strut."""
     pitch = either_sign(rng) * uniform(rng, 0.25, 0.6)
@@ -129,7 +129,7 @@ def _leaning_board(rows: FloatArray, material: int, rng: np.random.Generator) ->
     return foot(rows, count, 0.5 * low - 0.02, 0.0, 0.05 + 0.5 * abs(low), 0.7 * half_width)
 
 
-@njit(cache=True)
+@compiled
 def _arch(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A lintel across the way on two posts."""
     half_width, half_depth = uniform(rng, 0.06, 0.12), uniform(rng, 0.02, 0.04)
@@ -142,7 +142,7 @@ def _arch(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return count
 
 
-@njit(cache=True)
+@compiled
 def _hanging(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A board or a lamp that hangs from a stand at the side."""
     side = either_sign(rng)
@@ -160,7 +160,7 @@ def _hanging(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return foot(rows, count, 0.0, 0.6 * pole, 0.055, 0.05 + 0.4 * abs(pole))
 
 
-@njit(cache=True)
+@compiled
 def _roof(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A horizontal board on four posts, like a small table."""
     half_x, half_y, height = uniform(rng, 0.05, 0.10), uniform(rng, 0.06, 0.11), uniform(rng, 0.20, 0.28)
@@ -171,7 +171,7 @@ def _roof(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return count
 
 
-@njit(cache=True)
+@compiled
 def _shelf(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A board that stands out from a wall, over the target or beside it."""
     half_x, half_y, height = uniform(rng, 0.04, 0.08), uniform(rng, 0.06, 0.11), uniform(rng, 0.18, 0.27)
@@ -184,7 +184,7 @@ def _shelf(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
 # -- around the target -------------------------------------------------------------------------------------------------
 
 
-@njit(cache=True)
+@compiled
 def _cabinet(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """A box that is open at one side."""
     half_x, half_y, top = uniform(rng, 0.06, 0.08), uniform(rng, 0.14, 0.18), uniform(rng, 0.26, 0.32)
@@ -196,7 +196,7 @@ def _cabinet(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return stiles(rows, count, material, half_x, half_y, top, shift)
 
 
-@njit(cache=True)
+@compiled
 def _niche(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """Three walls in a U, or two in an L, without a roof."""
     half_x, half_y, top = uniform(rng, 0.08, 0.11), uniform(rng, 0.12, 0.16), uniform(rng, 0.12, 0.26)
@@ -213,7 +213,7 @@ def _niche(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return foot(rows, count, -half_x - 0.02, 0.0, 0.03, half_y)
 
 
-@njit(cache=True)
+@compiled
 def _bin(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     """Four low walls, and a lid over the half that is turned away."""
     half_x, half_y, top = uniform(rng, 0.15, 0.19), uniform(rng, 0.14, 0.18), uniform(rng, 0.03, 0.06)
@@ -225,7 +225,7 @@ def _bin(rows: FloatArray, material: int, rng: np.random.Generator) -> int:
     return write_pane(rows, count, second, half_y, half_depth, half_depth - half_x, 0.0, lid_height, -math.pi / 2)
 
 
-@njit(cache=True)
+@compiled
 def _second(material: int) -> int:
     """Material of the other boards of a piece: MuJoCo draws the reflection of one board only."""
     return OPAQUE if material == MIRROR else material

@@ -9,9 +9,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
+from fixation_gym.compiled import compiled
 from fixation_gym.envs.object_pool import SLOTS
 from fixation_gym.envs.shapes import FINISHES, MATERIALS, PRIMITIVES, Part
 from fixation_gym.types import FloatArray, Vector
@@ -132,31 +132,31 @@ def write_pane(
     return count
 
 
-@njit(cache=True)
+@compiled
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """A draw, compiled once: numba would repeat its code wherever it is asked for."""
     return rng.uniform(low, high)
 
 
-@njit(cache=True)
+@compiled
 def below(rng: np.random.Generator, count: int) -> int:
     """A whole number from 0 on and less than ``count``, compiled once, too."""
     return int(rng.integers(0, count))
 
 
-@njit(cache=True)
+@compiled
 def either_sign(rng: np.random.Generator) -> float:
     """-1 or 1."""
     return _SIGNS[below(rng, len(_SIGNS))]
 
 
-@njit(cache=True)
+@compiled
 def post(rows: FloatArray, count: int, x: float, y: float, top: float, half: float) -> int:
     """A square post from the table up to ``top``."""
     return put(rows, count, (x, y, 0.5 * top), (half, half, 0.5 * top), 0.0, RIM)
 
 
-@njit(cache=True)
+@compiled
 def foot(rows: FloatArray, count: int, x: float, y: float, half_x: float, half_y: float) -> int:
     """A heavy plate on the table."""
     count = put(rows, count, (x, y, 0.005), (half_x, half_y, 0.005), 0.0, RIM)
@@ -164,7 +164,7 @@ def foot(rows: FloatArray, count: int, x: float, y: float, half_x: float, half_y
     return count
 
 
-@njit(cache=True)
+@compiled
 def turn(rows: FloatArray, angle: float, rise: float) -> None:
     """Turn all rows about the vertical, and raise them."""
     c, s = math.cos(angle), math.sin(angle)
@@ -174,7 +174,7 @@ def turn(rows: FloatArray, angle: float, rise: float) -> None:
         rows[i, YAW] += angle
 
 
-@njit(cache=True)
+@compiled
 def sides(rows: FloatArray, count: int, material: int, half_x: float, half_y: float, top: float, shift: float) -> int:
     """Two boards along x at both ends of y: a board that faces +x, turned by a quarter about the vertical."""
     for side in (-1.0, 1.0):
@@ -186,7 +186,7 @@ def sides(rows: FloatArray, count: int, material: int, half_x: float, half_y: fl
     return count
 
 
-@njit(cache=True)
+@compiled
 def stiles(rows: FloatArray, count: int, material: int, half_x: float, half_y: float, top: float, shift: float) -> int:
     """Edges of what is see-through, so that something of it can be seen."""
     if material == OPAQUE:

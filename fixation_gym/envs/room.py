@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
+from fixation_gym.compiled import compiled
 from fixation_gym.control.box_pairs import Triple
 from fixation_gym.control.box_tests import packed, steps_off, steps_past
 from fixation_gym.geometry.boxes import BoxSet
@@ -40,7 +39,7 @@ class Room(NamedTuple):
     """What the hand sweeps on them, as in ``box_tests.packed_hand``."""
 
 
-@njit(cache=True)
+@compiled
 def steps_to_room(boxes: FloatArray, step: Triple, most: int, room: Room) -> int:
     """Number of steps after which an obstacle has room; -1 if it never has.
 
@@ -74,7 +73,7 @@ def holds(room: Room, boxes: BoxSet) -> bool:
     return steps_to_room(packed(boxes), (0.0, 0.0, 0.0), 0, room) == 0
 
 
-@njit(cache=True)
+@compiled
 def _off_bounds(boxes: FloatArray, step: Triple, table: FloatArray, reds: FloatArray) -> int:
     """0 if boxes are above the table, and within ``_ORBIT`` of the target if the hand might meet them there.
 

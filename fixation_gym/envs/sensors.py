@@ -8,9 +8,9 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fixation_gym.compiled import compiled
 from fixation_gym.envs.sensor_noise import SensorNoise
 from fixation_gym.geometry.rigid import inverse, matrix_to_pose
 from fixation_gym.geometry.twist import adjoint
@@ -132,7 +132,7 @@ def _normal_quantiles() -> NDArray[np.float32]:
     return table
 
 
-@njit(cache=True)
+@compiled
 def _add_noise(
     image: NDArray[np.uint8],
     bits: NDArray[np.uint16],

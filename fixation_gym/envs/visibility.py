@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from fixation_gym.compiled import compiled
 from fixation_gym.envs.drafts import Drafts
 from fixation_gym.envs.object_pool import target_shape
 from fixation_gym.envs.part_rows import PITCH, YAW
@@ -44,7 +44,7 @@ def is_seen(obstacle: ObstacleSpec, T_base_cam: FloatArray, others: list[Obstacl
     return bool(seen.mean() > 0.15)
 
 
-@njit(cache=True)
+@compiled
 def pass_through(drafts: Drafts, camera: FloatArray, point: FloatArray) -> MaskArray:
     """Which drafts have the line from camera to point pass through the inner part of the box around them."""
     through = np.zeros(len(drafts.kinds), np.bool_)
@@ -60,7 +60,7 @@ def pass_through(drafts: Drafts, camera: FloatArray, point: FloatArray) -> MaskA
     return through
 
 
-@njit(cache=True)
+@compiled
 def _box_around(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Middle and half sizes of the box around parts, along the axes of their frame."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -92,7 +92,7 @@ def _hidden(camera: FloatArray, points: FloatArray, obstacles: list[ObstacleSpec
     return hidden
 
 
-@njit(cache=True)
+@compiled
 def _crossed(
     camera: FloatArray, points: FloatArray, centre: FloatArray, rotation: FloatArray, half: FloatArray
 ) -> MaskArray:

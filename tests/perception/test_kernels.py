@@ -2,7 +2,6 @@ from dataclasses import fields
 from functools import cache
 
 import cv2
-import numba
 import numpy as np
 import plain_twins as twins
 import pytest
@@ -156,15 +155,3 @@ def test_a_mask_on_the_grid_covers_every_pixel_of_it(shape):
     mask[31:77, 203] = mask[200, 17:23] = True
     area = cv2.resize(mask.view(np.uint8) * np.uint8(255), shape[::-1], interpolation=cv2.INTER_AREA)
     np.testing.assert_array_equal(zero_flow.widened_on_grid(mask, shape, 0), area > 0)
-
-
-def test_loops_are_compiled_where_nothing_can_be_cached(monkeypatch):
-    njit = numba.njit
-
-    def without_a_place(cache=False, **options):
-        if cache:
-            raise RuntimeError("cannot cache function: no locator available")
-        return njit(**options)
-
-    monkeypatch.setattr(numba, "njit", without_a_place)
-    assert kernels.compiled(lambda x: x + 1)(1) == 2

@@ -1,4 +1,4 @@
-"""Compiled loops for the flow, and how those of all of perception are compiled.
+"""Compiled loops for the flow.
 
 Arrays are filled by loops: an assignment of an array to a part of another one would take numba five seconds, which
 compile the message about shapes that do not fit.
@@ -6,29 +6,15 @@ compile the message about shapes that do not fit.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
-import numba
 import numpy as np
+
+from fixation_gym.compiled import compiled_fast
 
 WINDOW = 5
 """Side of the square over which ``window_sums`` pools gradients, px of the flow grid."""
 
 
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile at the first call; the code is cached beside the source, or else in numba's cache directory.
-
-    Sums may be reordered and multiply-adds fused; NaN and inf keep their meaning.
-    """
-    options = {"nogil": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
-    try:
-        return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # no place on disk to cache in
-        return numba.njit(**options)(function)
-
-
-@compiled
+@compiled_fast
 def _rows_around(image, row):
     """The row, the two above and the two below; the border is repeated."""
     last = image.shape[0] - 1
@@ -41,14 +27,14 @@ def _rows_around(image, row):
     )
 
 
-@compiled
+@compiled_fast
 def _repeat_border(line):
     """Fill the two border pixels at each end of a line."""
     line[0] = line[1] = line[2]
     line[-1] = line[-2] = line[-3]
 
 
-@compiled
+@compiled_fast
 def _cell_weights(pixels):
     """Weights of pixels 2 i, 2 i + 1 and 2 i + 2 in cell i of a grid of half the size, shape (3, pixels // 2); sum 2.
 
@@ -64,7 +50,7 @@ def _cell_weights(pixels):
     return weights
 
 
-@compiled
+@compiled_fast
 def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
     """Means over 2 x 2 pixels: weighted products xx, xy, yy, xt, yt, weighted gradients x, y, t, the weight, and tt.
 
@@ -133,7 +119,7 @@ def pooled_products(smooth, change, prefilter, derivative, noise, pooled):
                     out[i] = first + second
 
 
-@compiled
+@compiled_fast
 def window_sums(planes, sums):
     """Sums over 5 x 5 windows, the border repeated; planes and sums of shape (n, h, w)."""
     count, height, width = planes.shape
@@ -149,7 +135,7 @@ def window_sums(planes, sums):
                 out[i] = line[i] + line[i + 1] + line[i + 2] + line[i + 3] + line[i + 4]
 
 
-@compiled
+@compiled_fast
 def centred_sums(windows, least, sums):
     """Products about the means of each window, with at least ``least`` information in every direction.
 
@@ -179,7 +165,7 @@ def centred_sums(windows, least, sums):
             energy[i] = wtt[i] - st[i] * st[i] / sw[i]
 
 
-@compiled
+@compiled_fast
 def solve_windows(sums, weak, cov, residual):
     """Invert J = sums[:3] with a weak prior into cov and solve residual = -cov b, b = sums[3:5]; see ``solve``."""
     height, width = sums.shape[1:]
@@ -196,7 +182,7 @@ def solve_windows(sums, weak, cov, residual):
             v[i] = -(b * x[i] + c * y[i])
 
 
-@compiled
+@compiled_fast
 def _bilinear(coarse, fine):
     """Where a fine line lies on a coarse one: nearest pixel and the one beside it, and their shares; each (2, fine).
 
@@ -214,13 +200,13 @@ def _bilinear(coarse, fine):
     return pixels, shares
 
 
-@compiled
+@compiled_fast
 def _fine_pixels(pixel, odd):
     """Pixels of a fine line that are decided by one of the coarse line: two, but three by the first if it is odd."""
     return range(2 * pixel + odd * min(pixel, 1), 2 * pixel + 2 + odd)
 
 
-@compiled
+@compiled_fast
 def take_coarse_where_fast(coarse, motion, fastest, scales, sums):
     """Replace the sums of a level by those of the next coarser one, enlarged bilinearly, where that sees fast motion.
 

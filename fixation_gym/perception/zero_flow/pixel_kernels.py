@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fixation_gym.perception.flow.kernels import compiled
+from fixation_gym.compiled import compiled_fast
 
 
-@compiled
+@compiled_fast
 def test_pixels(information, gradient, cov, residual, usable, question, answers, supported, moving):
     """Zero-flow test of every pixel: see ``pixel_answers`` for the meaning and ``PixelQuestion``.
 
@@ -53,7 +53,7 @@ def test_pixels(information, gradient, cov, residual, usable, question, answers,
             moving[row, i] = ok[i] and own[i] > np.float32(0)
 
 
-@compiled
+@compiled_fast
 def _normal_distribution(z):
     """Phi(z) to 2e-7: Abramowitz & Stegun 1964, 7.1.28."""
     x = min(abs(z), np.float32(8)) * np.float32(0.70710678)
@@ -67,7 +67,7 @@ def _normal_distribution(z):
     return np.float32(1) - e if z > np.float32(0) else e
 
 
-@compiled
+@compiled_fast
 def pooled_evidence(p_nearer, supported, moving, cells):
     """Means over square cells: evidence in front, its square, behind, its square, and the share of pixels seen.
 
@@ -110,7 +110,7 @@ def pooled_evidence(p_nearer, supported, moving, cells):
                     cells[k, cell + 1, i] += area * (np.float32(1) - share) * line[k, i]
 
 
-@compiled
+@compiled_fast
 def map_values(cells, least_front, front_weight, least_share, unknown, values):
     """Values 0..255 of the map from pooled evidence; see ``evidence_map``.
 
@@ -141,7 +141,7 @@ def map_values(cells, least_front, front_weight, least_share, unknown, values):
             values[row, i] = np.uint8(np.rint(np.float32(127.5) + np.float32(127.5) * decided)) if known else unknown
 
 
-@compiled
+@compiled_fast
 def _cells_of(cells, pixels):
     """First cell that each pixel of a row lies in and the share of the pixel in it; the rest lies in the next."""
     first, shares = np.empty(pixels, np.int64), np.empty(pixels, np.float32)
@@ -152,7 +152,7 @@ def _cells_of(cells, pixels):
     return first, shares
 
 
-@compiled
+@compiled_fast
 def in_colour_range(rgb, start, step, least_spread, hue_scale, hue_in_range, out):
     """Test pixels of an image for hue, saturation and brightness, with the integer arithmetic of OpenCV's RGB2HSV.
 
