@@ -9,6 +9,8 @@ import time
 
 import numpy as np
 
+from fixation_gym.experiments.bench.processes import resident_kib
+
 _TIMES = 5
 """Processes whose medians are taken; one before them fills the caches."""
 _CODE = "import time; begin = time.process_time(), time.perf_counter(); from {} import run_first_use as run; run(begin)"
@@ -37,17 +39,17 @@ def run_first_use(begin: tuple[float, float]) -> None:
     import fixation_gym  # noqa: F401 - registers the environment
     from fixation_gym.envs.config import SCENARIO_NAMES
 
-    imported = _resident_mb()
+    imported = resident_kib() / 1024
     env = gym.make("FixationPick-v0", scenario="opaque")
     env.reset(seed=0)
     used = time.process_time() - begin[0], time.perf_counter() - begin[1]
-    opened = _resident_mb()
+    opened = resident_kib() / 1024
     env.close()
-    closed = several = _resident_mb()
+    closed = several = resident_kib() / 1024
     for name in SCENARIO_NAMES[:11]:
         env = gym.make("FixationPick-v0", scenario=name)
         env.reset(seed=0)
-        several = _resident_mb()
+        several = resident_kib() / 1024
         env.close()
     found = {
         "import, make and reset, CPU s": used[0],
@@ -58,8 +60,3 @@ def run_first_use(begin: tuple[float, float]) -> None:
         "eleven scenarios in turn, MB": several,
     }
     print(json.dumps(found))
-
-
-def _resident_mb() -> float:
-    with open("/proc/self/status") as file:
-        return next(int(line.split()[1]) / 1024 for line in file if line.startswith("VmRSS:"))

@@ -101,7 +101,7 @@ def run_memory() -> None:
         for _ in range(per_reset):
             env.step(action)
         env.reset()
-        resident.append(_resident_kib())
+        resident.append(resident_kib())
     settled = np.array(resident[_MEMORY_RESETS // 5 :])  # caches fill at first
     slope = float(np.polyfit(np.arange(len(settled)) * per_reset, settled, 1)[0])
     print(
@@ -116,7 +116,8 @@ def run_memory() -> None:
     )
 
 
-def _resident_kib() -> float:
+def resident_kib() -> float:
+    """Resident memory of this process, KiB."""
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024
 
