@@ -139,6 +139,11 @@ class Scenario:
         return not (self.any_colour or self.target_hue_deg)
 
     @property
+    def has_obstacles(self) -> bool:
+        """Whether there may be any."""
+        return self.obstacle_count[1] + self.moving_count[1] > 0
+
+    @property
     def plain(self) -> bool:
         """Whether MuJoCo's pictures show it as it is; otherwise it is made for ``renderer="mitsuba"``."""
         return set(self.obstacle_materials) <= set(PLAIN_MATERIALS) and not self.several_mirrors
@@ -152,7 +157,7 @@ class Scenario:
             raise ValueError(f"obstacle_count and moving_count may add up to {MAX_OBSTACLES}, got {still} and {moving}")
         if (self.through_sight or self.discovery) and still[0] < 1:
             raise ValueError("through_sight and discovery need an obstacle_count of 1 or more")
-        if still[1] + moving[1] == 0:
+        if not self.has_obstacles:
             return
         if not self.obstacle_materials or not self.obstacle_kinds:
             raise ValueError(f"obstacle_count {still} needs obstacle_materials and obstacle_kinds to draw from")

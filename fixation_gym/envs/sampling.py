@@ -86,10 +86,9 @@ def _with_events_drawn(scenario: Scenario, rng: np.random.Generator) -> Scenario
 
 def _propose(scenario: Scenario, menu: Menu, free: tuple[float, float], rng: np.random.Generator) -> SceneSpec | None:
     goal = sample_goal(scenario, free, rng)
-    crowded = scenario.obstacle_count[1] + scenario.moving_count[1] > 0
-    pool = draw_pool(scenario, menu, goal, rng) if crowded else None
+    pool = draw_pool(scenario, menu, goal, rng) if scenario.has_obstacles else None
     views = (_sample_view(scenario, goal, rng) for _ in range(_VIEW_DRAWS))
-    if not crowded:
+    if not scenario.has_obstacles:
         view = next((view for view in views if view), None)
         return None if view is None else _scene(scenario, goal, view, (), rng)
     if pool is None:

@@ -8,6 +8,7 @@ from fixation_gym.perception.body.upright_body import UprightBody
 from fixation_gym.perception.detection.segmentation import Segmentation
 from fixation_gym.perception.distance.pose_filter import Fixation
 from fixation_gym.perception.flow.optic_flow import Flow
+from fixation_gym.perception.hand_eye.hand_eye_filter import HandEyeState
 from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow
 from fixation_gym.types import FloatArray
 
@@ -30,6 +31,8 @@ class Percept:
     """Camera pose in base at the time of ``flow`` and ``zfc``, one frame ago, shape (4, 4)."""
     body: UprightBody | None = None
     """The body whose surface is fixated; None while its centre is not sure."""
+    hand_eye: HandEyeState | None = None
+    """What was learnt of the hand-eye error; None if it is not learnt."""
 
     @property
     def centre_base(self) -> FloatArray:

@@ -9,6 +9,7 @@ from fixation_gym.perception.detection.colour import RED, Colour
 from fixation_gym.perception.detection.tracking import TrackingSettings
 from fixation_gym.perception.distance.pose_filter import DistanceSettings
 from fixation_gym.perception.flow.gradients import FlowSettings
+from fixation_gym.perception.hand_eye.hand_eye_filter import HandEyeSettings
 from fixation_gym.perception.zero_flow.zero_flow import ZeroFlowSettings
 
 
@@ -28,5 +29,7 @@ class PerceptionSettings:
     """How the centre of the target's body is found; None: the fixated point is taken for it. Needs a support height."""
     zero_flow: ZeroFlowSettings = field(default_factory=ZeroFlowSettings)
     """Margins and gates of the zero-flow test."""
+    hand_eye: HandEyeSettings | None = field(default_factory=HandEyeSettings)
+    """How the hand-eye error is learnt from the support surface; None: it is not. Needs a support height."""
     max_gap_s: float = 0.15
     """Frames farther apart than this are not differentiated, s."""

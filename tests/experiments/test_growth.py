@@ -20,6 +20,7 @@ FOUND = {
         for n in (0, 8)
     ],
     "episode": [{"step": step, "act_ms": 4.25, "step_ms": 7.0, "calls": 50} for step in (0, 25)],
+    "resets": [{"name": "opaque", "ms_median": 4.0, "ms_mean": 7.5, "ms_max": 30.0, "resets": 100}],
     "workers": [
         {"kind": kind, "workers": n, "steps_per_s": 100.0 * n, "mb_each": 285.0}
         for n in (1, 2)
@@ -34,6 +35,7 @@ def test_the_table_names_every_measurement_once():
         "after the first reset, MB 380.0",
         "320x240 2.00 3.00",
         "8 obstacles, 128x128 9.00 10.00",
+        "opaque 4.0 7.5 30.0",
         "25 4.25 7.00",
         "SubprocVecEnv, 2 200.0 285",
     ):

@@ -1,4 +1,4 @@
-"""How costs grow: with the size of the image, the number of obstacles, workers, and the length of an episode.
+"""How costs grow: with the size of the image, the number of obstacles, workers, the scenario, and the episode.
 
 What belongs together is timed in turn, so that a machine whose speed drifts slows all of it alike.
 """
@@ -18,7 +18,7 @@ import gymnasium as gym
 import numpy as np
 
 from fixation_gym.doctor import installed_versions
-from fixation_gym.envs.config import resolve_scenario
+from fixation_gym.envs.config import SCENARIO_NAMES, resolve_scenario
 from fixation_gym.evaluation.files import write_json
 from fixation_gym.evaluation.storage import folder_lock, make_folder
 from fixation_gym.experiments.bench.cases import ENDLESS, Size, label, make_perception, stepper
@@ -34,6 +34,8 @@ _SIZES: tuple[Size, ...] = ((32, 32), (64, 64), (128, 128), (192, 192), (240, 32
 _OBSTACLES = (0, 2, 4, 6, 8)
 _EPISODES, _BIN = 6, 25
 """Episodes of the servo, and how many of their steps make one median."""
+_RESETS, _FIRST_SCENE = 100, 5000
+"""Resets of every scenario, and the seed of the first one."""
 
 
 def growth(quick: bool, out: Path) -> dict[str, Any]:
@@ -44,7 +46,7 @@ def growth(quick: bool, out: Path) -> dict[str, Any]:
         out: folder; made if needed, an earlier ``growth.json`` there is replaced.
 
     Returns:
-        The content of ``growth.json``: ``sizes``, ``obstacles``, ``workers``, ``episode`` and ``first_use``.
+        The content of ``growth.json``: ``sizes``, ``obstacles``, ``workers``, ``resets``, ``episode``, ``first_use``.
 
     Raises:
         UsageError: if the folder cannot be used.
@@ -56,6 +58,7 @@ def growth(quick: bool, out: Path) -> dict[str, Any]:
         for name, build in (("sizes", _size_cases), ("obstacles", _obstacle_cases)):
             with closing(ProcessGroup(build)) as group:
                 found[name] = measure([group], rounds)
+        found["resets"] = reset_rows(10 if quick else _RESETS)
         found["episode"] = episode_rows(2 if quick else _EPISODES)
         found["workers"] = worker_rows((1, 2) if quick else (1, 2, 4, 8))
         found |= {"versions": installed_versions(), "gl": os.environ.get("MUJOCO_GL"), "cpus": os.cpu_count()}
@@ -83,6 +86,39 @@ def _obstacle_cases() -> Iterator[Case]:
             env.reset(seed=0)
             suffix = "no image" if size is None else label(size)
             yield Case(f"{obstacles} obstacles, {suffix}", stepper(env), env.close)
+
+
+def reset_rows(resets: int) -> list[dict[str, Any]]:
+    """Times of so many resets without image of every scenario, nearly all of which is the search for a scene.
+
+    Returns:
+        A row per scenario with median, mean and longest time, ms, and one over all of those with obstacles.
+    """
+    times = {name: _reset_times(name, resets) for name in SCENARIO_NAMES}
+    crowded = [name for name in SCENARIO_NAMES if resolve_scenario(name).has_obstacles]
+    times["all with obstacles"] = [time_ms for name in crowded for time_ms in times[name]]
+    return [
+        {
+            "name": name,
+            "ms_median": float(np.median(own)),
+            "ms_mean": float(np.mean(own)),
+            "ms_max": max(own),
+            "resets": len(own),
+        }
+        for name, own in times.items()
+    ]
+
+
+def _reset_times(scenario: str, resets: int) -> list[float]:
+    env = gym.make("FixationPick-v0", scenario=scenario, image_size=None)
+    env.reset(seed=0)  # builds the simulation
+    times = []
+    for seed in range(_FIRST_SCENE, _FIRST_SCENE + resets):
+        begin = time.perf_counter()
+        env.reset(seed=seed)
+        times.append(1e3 * (time.perf_counter() - begin))
+    env.close()
+    return times
 
 
 def episode_rows(episodes: int) -> list[dict[str, Any]]:
@@ -125,6 +161,11 @@ def format_growth(found: dict[str, Any]) -> str:
     lines += ["", f"{'step':32} {'median ms':>10} {'p95 ms':>10}"]
     for name in ("sizes", "obstacles"):
         lines += [f"{row['name']:32} {row['ms_median']:10.2f} {row['ms_p95']:10.2f}" for row in found[name]]
+    lines += ["", f"{'reset without image':32} {'median ms':>10} {'mean ms':>10} {'longest':>10}"]
+    lines += [
+        f"{row['name']:32} {row['ms_median']:10.1f} {row['ms_mean']:10.1f} {row['ms_max']:10.1f}"
+        for row in found["resets"]
+    ]
     lines += ["", f"{'servo, from step':32} {'act ms':>10} {'step ms':>10}"]
     lines += [f"{row['step']:32d} {row['act_ms']:10.2f} {row['step_ms']:10.2f}" for row in found["episode"]]
     lines += ["", f"{'vector of environments':32} {'steps / s':>10} {'MB each':>10}"]

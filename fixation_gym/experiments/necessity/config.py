@@ -157,4 +157,4 @@ def scenarios_with_obstacles() -> tuple[str, ...]:
     """Names of the scenarios in which something may be in the way."""
     from fixation_gym.envs.config import SCENARIOS
 
-    return tuple(name for name, item in SCENARIOS.items() if item.obstacle_count[1] + item.moving_count[1] > 0)
+    return tuple(name for name, item in SCENARIOS.items() if item.has_obstacles)

@@ -107,9 +107,7 @@ def zero_flow_test(
     shape = flow.overlap.shape
     if not flow.valid or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
         return unknown_zero_flow(*shape)
-    usable = flow.overlap & ~widened_on_grid(gaze.target, shape, settings.target_margin_px)
-    if self_mask is not None:
-        usable &= ~widened_on_grid(self_mask, shape, 1)
+    usable = usable_pixels(flow, gaze.target, self_mask, settings)
     exact = _question(flow, gaze, settings, support_height_m)
     fixated, margin = gaze.inverse_distance, settings.depth_margin
     asked = FrontQuestion(flow, usable, exact, gaze.twist, fixated, margin, pictures)
@@ -131,6 +129,14 @@ def zero_flow_test(
         inverse_depth_std=answers.inverse_depth_std,
         fixated_inverse_depth=gaze.inverse_distance,
     )
+
+
+def usable_pixels(flow: Flow, target: MaskArray, self_mask: MaskArray | None, settings: ZeroFlowSettings) -> MaskArray:
+    """Pixels of the flow's grid, shape (h, w), that show neither the target nor the robot; masks are of any shape."""
+    usable = flow.overlap & ~widened_on_grid(target, flow.overlap.shape, settings.target_margin_px)
+    if self_mask is not None:
+        usable &= ~widened_on_grid(self_mask, flow.overlap.shape, 1)
+    return usable
 
 
 def _leave_the_decided(answers: PixelAnswers) -> None:

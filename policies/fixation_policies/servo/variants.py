@@ -94,6 +94,11 @@ VARIANTS: tuple[ServoVariant, ...] = (
         estimator=TwistEstimator,
     ),
     ServoVariant(
+        "servo:no_hand_eye",
+        "learning from the table where the camera truly sits on the hand",
+        perception=PerceptionSettings(hand_eye=None),
+    ),
+    ServoVariant(
         "servo:no_tracking",
         "tracking: every image is segmented like the first",
         detector=partial(ColourDetector, follow=False),

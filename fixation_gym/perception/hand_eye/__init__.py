@@ -1,0 +1,1 @@
+"""Where the camera truly sits on the hand, learnt from pictures of the support surface."""

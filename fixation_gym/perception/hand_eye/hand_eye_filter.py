@@ -1,0 +1,228 @@
+"""The hand-eye error, learnt from how the support surface moves in the picture while a robot gazes.
+
+The height of the table is known, and so is how the hand moves; if the camera sits on the hand as was believed, the flow
+of the table follows from both. A hand-eye error turns the direction of motion, moves the table and tilts it, each time
+by a few percent, and all of this is linear in the error. So a few thousand pixels of table say in a second what a
+calibration with a board says; without it Z_f is off by percents, and the table seems to be an obstacle.
+
+Beside the error (translation t, rotation vector r: the true camera in the believed one) two things are learnt: how much
+higher the table is, which also takes what kinematic calibration leaves, and the gain of the flow, since gradients
+shorten it by some percent. Errors of the momentary twist are unknown, too, and forgotten with each picture.
+
+Value in, value out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from fixation_gym.geometry.rigid import cross
+from fixation_gym.geometry.twist import skew
+from fixation_gym.perception.flow.optic_flow import Flow
+from fixation_gym.perception.hand_eye.plane_kernel import GAIN, HEIGHT, UNKNOWNS, plane_equations
+from fixation_gym.types import FloatArray, MaskArray
+
+_KEPT = 8
+"""Unknowns that last: all but the errors of the twist."""
+_HAND_EYE = slice(0, 6)
+_ROUNDS = 2
+"""Times that the equations are solved for a picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandEyeSettings:
+    """Priors, noise and gates."""
+
+    translation_std_m: float = 3e-3
+    """Prior of the hand-eye translation error per axis, m."""
+    rotation_std_rad: float = 9e-3
+    """Prior of the hand-eye rotation error per axis, rad."""
+    height_std_m: float = 5e-3
+    """Prior of the error of the surface's height, m."""
+    gain_std: float = 0.1
+    """Prior of the relative error of the flow's length."""
+    translation_walk_m: float = 5e-4
+    """Random walk of the translation error, m per square root of a second: a hand's joints have errors, too, and what
+    they do depends on the posture."""
+    rotation_walk_rad: float = 1e-3
+    """The same of the rotation error, rad."""
+    height_walk_m: float = 2e-3
+    """The same of the height, m."""
+    gain_walk: float = 1e-3
+    """The same of the gain."""
+    velocity_std: float = 2e-3
+    """Noise of the camera's velocity between pictures per axis, m/s."""
+    rate_std: float = 4e-3
+    """Noise of its angular rate per axis, rad/s."""
+    least_speed: float = 0.02
+    """A camera slower than this, m/s, teaches nothing."""
+    nearest_m: float = 0.18
+    """Nor does one that is nearer to the target: the hand and what it holds fill the picture, m."""
+    stride: int = 3
+    """Step between the pixels that are asked, px of the flow's grid."""
+    highest_m: float = 0.02
+    """What seems higher above or below the surface does not belong to it, m."""
+    least_sure_m: float = 0.02
+    """Nor is asked what does not know its height to this standard deviation, m."""
+    thickness_m: float = 4e-3
+    """Standard deviation of what lies on the surface, m."""
+    worst_fit_m: float = 8e-3
+    """A picture whose pixels lie farther from the surface in the mean is not used, m."""
+    shared: float = 25.0
+    """Neighbouring pixels whose windows show the same."""
+    least_pixels: int = 60
+    """Pictures with fewer pixels of the surface are not used."""
+    proven: float = 60.0
+    """The error is corrected from where it is this many times its variance (squared Mahalanobis norm, 6 degrees of
+    freedom): far beyond chance, since pixels err together. A good calibration stays as it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandEyeState:
+    """What was learnt."""
+
+    mean: FloatArray
+    """t in m and r in rad of the true camera in the believed one, height of the surface above where it should be in m,
+    relative gain of the flow; shape (8,)."""
+    cov: FloatArray
+    """Its covariance, shape (8, 8)."""
+    proven: bool = False
+    """Whether the hand-eye error has shown."""
+    pictures: int = 0
+    """Pictures that it was learnt from."""
+
+    @property
+    def stds(self) -> FloatArray:
+        """Standard deviations of the unknowns, shape (8,)."""
+        return np.sqrt(np.diag(self.cov))
+
+    @property
+    def T_believed_true(self) -> FloatArray:
+        """The true camera in the believed one, shape (4, 4); no difference before it is proven."""
+        T = np.eye(4)
+        if self.proven:
+            T[:3, :3], T[:3, 3] = _rotation(self.mean[3:6]), self.mean[:3]
+        return T
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceView:
+    """A picture, as far as it tells of the surface."""
+
+    flow: Flow
+    usable: MaskArray
+    """Pixels that are neither target nor robot, shape (h, w)."""
+    T_base_believed: FloatArray
+    """Camera pose at the flow, uncorrected, shape (4, 4)."""
+    twist: FloatArray
+    """Mean twist [v, w] over the flow's frames, uncorrected, shape (6,)."""
+    warp_twist: FloatArray
+    """The twist of the poses that the pictures were warped with, shape (6,)."""
+    height_m: float
+    """Of the surface in base, m."""
+    since_s: float
+    """Since the picture before, s."""
+    distance_m: float
+    """Of the target, m."""
+
+
+def first_state(settings: HandEyeSettings) -> HandEyeState:
+    """What is known without a picture."""
+    stds = [settings.translation_std_m] * 3 + [settings.rotation_std_rad] * 3
+    return HandEyeState(np.zeros(_KEPT), np.diag(np.square([*stds, settings.height_std_m, settings.gain_std])))
+
+
+def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -> HandEyeState:
+    """What is known after a picture; the same if it tells nothing."""
+    v = seen.twist[:3]
+    if not seen.flow.valid or seen.distance_m < settings.nearest_m or float(v @ v) < settings.least_speed**2:
+        return state
+    if seen.height_m >= float(seen.T_base_believed[2, 3]):
+        return state
+    cov = state.cov + seen.since_s * np.diag(_walk(settings))
+    prior = np.zeros((UNKNOWNS, UNKNOWNS))
+    prior[:_KEPT, :_KEPT] = np.linalg.inv(cov)
+    prior[_KEPT:, _KEPT:] = np.diag([settings.velocity_std**-2] * 3 + [settings.rate_std**-2] * 3)
+    before = np.concatenate([state.mean, np.zeros(UNKNOWNS - _KEPT)])
+    mean = before
+    for _ in range(_ROUNDS):
+        matrix, vector, pixels, height = _equations(mean, seen, settings)
+        if pixels < settings.least_pixels:
+            return state
+        information = prior + matrix
+        mean = mean + np.linalg.solve(information, vector - prior @ (mean - before))
+    if height > settings.worst_fit_m:
+        return state
+    cov = np.linalg.inv(information)[:_KEPT, :_KEPT]
+    found = HandEyeState(mean[:_KEPT], 0.5 * (cov + cov.T), state.proven, state.pictures + 1)
+    return replace(found, proven=found.proven or evidence(found) > settings.proven)
+
+
+def evidence(state: HandEyeState) -> float:
+    """Squared Mahalanobis norm of the hand-eye error, 6 degrees of freedom."""
+    error = state.mean[_HAND_EYE]
+    return float(error @ np.linalg.solve(state.cov[_HAND_EYE, _HAND_EYE], error))
+
+
+def _walk(settings: HandEyeSettings) -> FloatArray:
+    """Variances per second, shape (8,)."""
+    walks = [settings.translation_walk_m] * 3 + [settings.rotation_walk_rad] * 3
+    return np.square([*walks, settings.height_walk_m, settings.gain_walk])
+
+
+def _equations(
+    mean: FloatArray, seen: SurfaceView, settings: HandEyeSettings
+) -> tuple[FloatArray, FloatArray, int, float]:
+    """Normal matrix (14, 14) and vector (14,) at some unknowns, number of pixels, and their mean height, m."""
+    camera, period = seen.flow.intrinsics, seen.flow.period
+    x, y = camera.grid
+    view, jacobian = _true_view(mean, seen)
+    warp = np.concatenate([[seen.flow.warp_inverse_depth], seen.warp_twist])
+    scale = np.array([camera.fx * period, camera.fy * period])
+    bounds = np.array(
+        [settings.stride, settings.highest_m, settings.least_sure_m, settings.thickness_m]
+        + [settings.shared / settings.stride**2]
+    )
+    sums = np.zeros((UNKNOWNS + 2, UNKNOWNS))
+    information, gradient = seen.flow.information, seen.flow.gradient
+    gain = 1.0 + float(mean[GAIN])
+    plane_equations(
+        information, gradient, seen.usable, x[0], y[:, 0], view, jacobian, warp, scale, gain, bounds, sums
+    )
+    lower = sums[:UNKNOWNS]
+    matrix = lower + np.tril(lower, -1).T
+    pixels = int(sums[UNKNOWNS + 1, 0])
+    return matrix, sums[UNKNOWNS], pixels, float(sums[UNKNOWNS + 1, 1]) / max(pixels, 1)
+
+
+def _true_view(mean: FloatArray, seen: SurfaceView) -> tuple[FloatArray, FloatArray]:
+    """The surface m, n . p / distance = 1 with m = n / distance, and the twist, both in the true camera.
+
+    Returns:
+        m, v and w, shape (9,), and their derivatives by the unknowns, shape (9, 14): those by r to first order in r.
+    """
+    t, turn_back = mean[:3], _rotation(mean[3:6]).T
+    v, w = seen.twist[:3] + mean[_KEPT : _KEPT + 3], seen.twist[3:] + mean[_KEPT + 3 :]
+    up = seen.T_base_believed[2, :3]
+    distance = seen.height_m + mean[HEIGHT] - seen.T_base_believed[2, 3] - float(up @ t)
+    surface = turn_back @ up / distance
+    velocity, rate = turn_back @ (v + cross(w, t)), turn_back @ w
+    jacobian = np.zeros((9, UNKNOWNS))
+    jacobian[:3, :3] = np.outer(surface, up) / distance
+    jacobian[:3, 3:6] = skew(surface)
+    jacobian[:3, HEIGHT] = -surface / distance
+    jacobian[3:6, :3] = turn_back @ skew(w)
+    jacobian[3:6, 3:6] = skew(velocity)
+    jacobian[3:6, _KEPT : _KEPT + 3] = turn_back
+    jacobian[3:6, _KEPT + 3 :] = -turn_back @ skew(t)
+    jacobian[6:, 3:6] = skew(rate)
+    jacobian[6:, _KEPT + 3 :] = turn_back
+    return np.concatenate([surface, velocity, rate]), jacobian
+
+
+def _rotation(vector: FloatArray) -> FloatArray:
+    """Rotation matrix of a rotation vector, shape (3, 3)."""
+    return cv2.Rodrigues(np.asarray(vector, dtype=np.float64))[0]
