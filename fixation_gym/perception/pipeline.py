@@ -202,6 +202,7 @@ class Perception:
                 warp_twist=mean_twist(first.T_base_cam, last.T_base_cam, duration),
                 height_m=height,
                 since_s=last.time - middle.time,
+                target=middle.segmentation.centroid,
                 distance_m=distance_m,
             ),
             settings,

@@ -28,8 +28,8 @@ from fixation_gym.types import FloatArray, MaskArray
 _KEPT = 8
 """Unknowns that last: all but the errors of the twist."""
 _HAND_EYE = slice(0, 6)
-_ROUNDS = 2
-"""Times that the equations are solved for a picture."""
+_ROUNDS, _SETTLED = 2, 20
+"""Times that the equations are solved for each of the first pictures, and number of these; later ones move little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class HandEyeSettings:
     """A camera slower than this, m/s, teaches nothing."""
     nearest_m: float = 0.18
     """Nor does one that is nearer to the target: the hand and what it holds fill the picture, m."""
-    stride: int = 3
+    stride: int = 4
     """Step between the pixels that are asked, px of the flow's grid."""
     highest_m: float = 0.02
     """What seems higher above or below the surface does not belong to it, m."""
@@ -75,9 +75,16 @@ class HandEyeSettings:
     """Neighbouring pixels whose windows show the same."""
     least_pixels: int = 60
     """Pictures with fewer pixels of the surface are not used."""
-    proven: float = 60.0
-    """The error is corrected from where it is this many times its variance (squared Mahalanobis norm, 6 degrees of
-    freedom): far beyond chance, since pixels err together. A good calibration stays as it is."""
+    translation_floor_m: float = 1.5e-3
+    """What pixels that err together and joint errors leave of the translation, m: see ``evidence``."""
+    rotation_floor_rad: float = 3e-3
+    """The same of the rotation, rad."""
+    proven: float = 16.8
+    """Evidence from which the error is corrected: 99 % of chi-square with 6 degrees of freedom. A good calibration
+    stays as it is."""
+    off_axis: float = 0.12
+    """A target farther from the image centre is not fixated, but grasped or lifted, and nothing is learnt; normalised
+    image coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,6 +132,8 @@ class SurfaceView:
     """Of the surface in base, m."""
     since_s: float
     """Since the picture before, s."""
+    target: FloatArray
+    """Where the target is seen, normalised image coordinates, shape (2,)."""
     distance_m: float
     """Of the target, m."""
 
@@ -138,7 +147,8 @@ def first_state(settings: HandEyeSettings) -> HandEyeState:
 def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -> HandEyeState:
     """What is known after a picture; the same if it tells nothing."""
     v = seen.twist[:3]
-    if not seen.flow.valid or seen.distance_m < settings.nearest_m or float(v @ v) < settings.least_speed**2:
+    fixated = seen.distance_m > settings.nearest_m and float(np.abs(seen.target).max()) < settings.off_axis
+    if not seen.flow.valid or not fixated or float(v @ v) < settings.least_speed**2:
         return state
     if seen.height_m >= float(seen.T_base_believed[2, 3]):
         return state
@@ -148,7 +158,7 @@ def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -
     prior[_KEPT:, _KEPT:] = np.diag([settings.velocity_std**-2] * 3 + [settings.rate_std**-2] * 3)
     before = np.concatenate([state.mean, np.zeros(UNKNOWNS - _KEPT)])
     mean = before
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS if state.pictures < _SETTLED else 1):
         matrix, vector, pixels, height = _equations(mean, seen, settings)
         if pixels < settings.least_pixels:
             return state
@@ -158,13 +168,18 @@ def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -
         return state
     cov = np.linalg.inv(information)[:_KEPT, :_KEPT]
     found = HandEyeState(mean[:_KEPT], 0.5 * (cov + cov.T), state.proven, state.pictures + 1)
-    return replace(found, proven=found.proven or evidence(found) > settings.proven)
+    return replace(found, proven=found.proven or evidence(found, settings) > settings.proven)
 
 
-def evidence(state: HandEyeState) -> float:
-    """Squared Mahalanobis norm of the hand-eye error, 6 degrees of freedom."""
+def evidence(state: HandEyeState, settings: HandEyeSettings) -> float:
+    """How sure it is that there is a hand-eye error: its squared Mahalanobis norm, 6 degrees of freedom.
+
+    The variance is that of the filter and a floor: pixels of one picture are wrong together, by the gain of the flow and
+    by what lies on the table, and no number of pictures takes that out.
+    """
+    floor = np.square([settings.translation_floor_m] * 3 + [settings.rotation_floor_rad] * 3)
     error = state.mean[_HAND_EYE]
-    return float(error @ np.linalg.solve(state.cov[_HAND_EYE, _HAND_EYE], error))
+    return float(error @ np.linalg.solve(state.cov[_HAND_EYE, _HAND_EYE] + np.diag(floor), error))
 
 
 def _walk(settings: HandEyeSettings) -> FloatArray:
