@@ -208,7 +208,9 @@ class Perception:
             settings,
         )
         if self._hand_eye.proven:
-            kept = (replace(frame, T_base_cam=self._true_pose(T)) for frame, T in zip(self._frames, believed, strict=True))
+            kept = (
+                replace(frame, T_base_cam=self._true_pose(T)) for frame, T in zip(self._frames, believed, strict=True)
+            )
             self._frames = deque(kept, maxlen=3)
 
     def _estimating(self) -> AbstractContextManager[str]:
