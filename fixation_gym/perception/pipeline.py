@@ -12,7 +12,7 @@ import numpy as np
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, pose_to_matrix
-from fixation_gym.geometry.twist import adjoint, mean_twist
+from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception.body.target_centre import TargetBody, with_outline
 from fixation_gym.perception.body.upright_body import UprightBody
 from fixation_gym.perception.detection.colour import ColourDetector, segment
@@ -31,7 +31,7 @@ from fixation_gym.perception.flow.optic_flow import (
     prepare_grey,
 )
 from fixation_gym.perception.flow.rolling_shutter import row_maps
-from fixation_gym.perception.hand_eye import hand_eye_filter as hand_eye
+from fixation_gym.perception.hand_eye.hand_eye import HandEye
 from fixation_gym.perception.pairing import PoseHistory, at_the_picture, carried
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.rectification import Rectification, in_colour
@@ -96,6 +96,7 @@ class Perception:
         self.support_height_m = support_height_m
         self._detector: Detector = detector or ColourDetector(intrinsics, self._settings.colour)
         self._estimator: DistanceEstimator = estimator or PoseEstimator(self._settings.distance)
+        self._hand_eye = HandEye(self._settings.hand_eye)
         self._working = intrinsics.halved(self._settings.flow.max_width)
         self._scratch = Scratch()
         _run_once()
@@ -105,8 +106,7 @@ class Perception:
         """Forget everything seen."""
         self._detector.reset()
         self._poses = PoseHistory()
-        settings = self._settings.hand_eye
-        self._hand_eye = None if settings is None else hand_eye.first_state(settings)
+        self._hand_eye.reset()
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -152,7 +152,7 @@ class Perception:
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
         if self._rectification is not None:
             observation = self._rectification.observation(observation)
-        T_base_cam = self._true_pose(pose_to_matrix(observation.camera_pose))
+        T_base_cam = self._hand_eye.true_pose(pose_to_matrix(observation.camera_pose))
         expected = expected_at(self._track, T_base_cam, observation.time, self._settings.tracking)
         segmentation = detected(self._detector, observation, expected, self._intrinsics)
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
@@ -171,47 +171,18 @@ class Perception:
             self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
         body = self._fit_body(frame, fixation)
-        self._learn_hand_eye(flow, fixation.distance_m)
-        return Percept(
-            observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam, body, self._hand_eye
-        )
+        self._learn_hand_eye(flow, fixation)
+        learnt = self._hand_eye.state
+        return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam, body, learnt)
 
-    def _true_pose(self, T_base_cam: FloatArray) -> FloatArray:
-        """A measured pose, corrected by what was learnt of the hand-eye error."""
-        learnt = self._hand_eye
-        return T_base_cam @ learnt.T_believed_true if learnt is not None and learnt.proven else T_base_cam
-
-    def _learn_hand_eye(self, flow: Flow, distance_m: float) -> None:
-        """Learn from how the support surface moves; what was learnt corrects all frames that are kept."""
-        settings, before, height = self._settings.hand_eye, self._hand_eye, self.support_height_m
-        if settings is None or before is None or height is None or not flow.valid:
+    def _learn_hand_eye(self, flow: Flow, fixation: Fixation) -> None:
+        """Learn from how the support surface moves; what was learnt corrects the frames that are kept."""
+        height = self.support_height_m
+        if height is None or not flow.valid or not all(frame.segmentation.visible for frame in self._frames):
             return
-        first, middle, last = self._frames
-        if not (middle.segmentation.visible and last.segmentation.visible):
-            return
-        duration = last.time - first.time
-        back = inverse(before.T_believed_true)
-        believed = [frame.T_base_cam @ back for frame in self._frames]
-        self._hand_eye = hand_eye.learned(
-            before,
-            hand_eye.SurfaceView(
-                flow=flow,
-                usable=usable_pixels(flow, middle.segmentation.mask, self._self_mask, self._settings.zero_flow),
-                T_base_believed=believed[1],
-                twist=mean_twist(believed[0], believed[2], duration),
-                warp_twist=mean_twist(first.T_base_cam, last.T_base_cam, duration),
-                height_m=height,
-                since_s=last.time - middle.time,
-                target=middle.segmentation.centroid,
-                distance_m=distance_m,
-            ),
-            settings,
-        )
-        if self._hand_eye.proven:
-            kept = (
-                replace(frame, T_base_cam=self._true_pose(T)) for frame, T in zip(self._frames, believed, strict=True)
-            )
-            self._frames = deque(kept, maxlen=3)
+        usable = usable_pixels(flow, self._frames[1].segmentation.mask, self._self_mask, self._settings.zero_flow)
+        frames = self._hand_eye.learn(self._frames, flow, usable, height, fixation.distance_m)
+        self._frames = deque(frames, maxlen=3)
 
     def _estimating(self) -> AbstractContextManager[str]:
         """Call the estimator, which may be somebody else's."""
@@ -231,10 +202,8 @@ class Perception:
 
     def _twist(self, observation: Observation, T_base_cam: FloatArray) -> FloatArray:
         """The measured twist, or else the mean one since the frame before; a camera is at rest before its first."""
-        measured, learnt = observation.camera_twist, self._hand_eye
-        if not math.isnan(measured[0]):
-            corrected = learnt is not None and learnt.proven
-            return adjoint(inverse(learnt.T_believed_true)) @ measured if corrected else measured
+        if not math.isnan(observation.camera_twist[0]):
+            return self._hand_eye.true_twist(observation.camera_twist)
         if not self._frames:
             return np.zeros(6)
         before = self._frames[-1]

@@ -92,7 +92,7 @@ class PaperVariant:
 
     def policy(self, intrinsics: Intrinsics, table_height: float) -> PaperPolicy:
         """The policy for a camera; ``table_height`` in base, m."""
-        settings = PerceptionSettings(zero_flow=ZeroFlowSettings(rule=self.rule))
+        settings = PerceptionSettings(zero_flow=ZeroFlowSettings(rule=self.rule), hand_eye=None)
         if not self.body:
             settings = replace(settings, centre=None)
         perception = Perception(

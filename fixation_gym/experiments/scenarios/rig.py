@@ -22,6 +22,7 @@ from fixation_gym.experiments.scenarios.scenes import Instance, sample_instance
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import matrix_to_pose, pose_to_matrix
 from fixation_gym.perception import Percept, Perception, segment
+from fixation_gym.perception.settings import PerceptionSettings
 from fixation_gym.robots import ROBOT
 from fixation_gym.types import FloatArray, ImageArray, Observation
 
@@ -62,7 +63,9 @@ class ScenarioRig:
         self._photoreal = PhotorealView(self.sim.model, INTRINSICS) if renderer == "mitsuba" else None
         self._pictures = 0
         self._view = View(self.sim.model, CAMERA_NAME, *IMAGE_SIZE, full_quality=False)
-        self.perception = Perception(INTRINSICS, support_height_m=ROBOT.workspace.table_height)
+        # Every look is judged by itself, and must not depend on what was learnt in looks before it.
+        settings = PerceptionSettings(hand_eye=None)
+        self.perception = Perception(INTRINSICS, settings, support_height_m=ROBOT.workspace.table_height)
         self._truth = TruthView(self.sim.model, self.perception.flow_intrinsics)
         self.owners = tuple(self.sim.model.body(body).name for body in self.sim.model.geom_bodyid)
         """Name of the body of every geom."""

@@ -15,12 +15,12 @@ Value in, value out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from fixation_gym.geometry.rigid import cross
-from fixation_gym.geometry.twist import skew
+from fixation_gym.geometry.twist import exp_twist, skew
 from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.hand_eye.plane_kernel import GAIN, HEIGHT, UNKNOWNS, plane_equations
 from fixation_gym.types import FloatArray, MaskArray
@@ -28,8 +28,8 @@ from fixation_gym.types import FloatArray, MaskArray
 _KEPT = 8
 """Unknowns that last: all but the errors of the twist."""
 _HAND_EYE = slice(0, 6)
-_ROUNDS, _SETTLED = 2, 20
-"""Times that the equations are solved for each of the first pictures, and number of these; later ones move little."""
+_FIRST = 20
+"""The first pictures, whose equations are solved twice; later ones move little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,17 +164,13 @@ def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -
     prior[:_KEPT, :_KEPT] = np.linalg.inv(cov)
     prior[_KEPT:, _KEPT:] = np.diag([settings.velocity_std**-2] * 3 + [settings.rate_std**-2] * 3)
     before = np.concatenate([state.mean, np.zeros(UNKNOWNS - _KEPT)])
-    mean = before
-    for _ in range(_ROUNDS if state.pictures < _SETTLED else 1):
-        matrix, vector, pixels, height = _equations(mean, seen, settings)
-        if pixels < settings.least_pixels:
-            return state
-        information = prior + matrix
-        mean = mean + np.linalg.solve(information, vector - prior @ (mean - before))
-    if height > settings.worst_fit_m:
+    fit = _fitted(before, before, prior, seen, settings)
+    if state.pictures < _FIRST and fit.pixels >= settings.least_pixels:
+        fit = _fitted(fit.mean, before, prior, seen, settings)
+    if fit.pixels < settings.least_pixels or fit.height_m > settings.worst_fit_m:
         return state
-    cov = np.linalg.inv(information)[:_KEPT, :_KEPT]
-    found = HandEyeState(mean[:_KEPT], 0.5 * (cov + cov.T), state.proven, state.pictures + 1)
+    cov = np.linalg.inv(fit.information)[:_KEPT, :_KEPT]
+    found = HandEyeState(fit.mean[:_KEPT], 0.5 * (cov + cov.T), state.proven, state.pictures + 1)
     enough = found.pictures >= settings.least_pictures
     return replace(found, proven=found.proven or (enough and evidence(found, settings) > settings.proven))
 
@@ -182,8 +178,8 @@ def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -
 def evidence(state: HandEyeState, settings: HandEyeSettings) -> float:
     """How sure it is that there is a hand-eye error: its squared Mahalanobis norm, 6 degrees of freedom.
 
-    The variance is that of the filter and a floor: pixels of one picture are wrong together, by the gain of the flow and
-    by what lies on the table, and no number of pictures takes that out.
+    The variance is that of the filter and a floor: pixels are wrong together, by the gain of the flow and by what lies
+    on the table, and no number of pictures takes that out.
     """
     floor = np.square([settings.translation_floor_m] * 3 + [settings.rotation_floor_rad] * 3)
     error = state.mean[_HAND_EYE]
@@ -196,27 +192,37 @@ def _walk(settings: HandEyeSettings) -> FloatArray:
     return np.square([*walks, settings.height_walk_m, settings.gain_walk])
 
 
-def _equations(
-    mean: FloatArray, seen: SurfaceView, settings: HandEyeSettings
-) -> tuple[FloatArray, FloatArray, int, float]:
-    """Normal matrix (14, 14) and vector (14,) at some unknowns, number of pixels, and their mean height, m."""
+class _Fit(NamedTuple):
+    """Unknowns that fit a picture."""
+
+    mean: FloatArray
+    """Shape (14,)."""
+    information: FloatArray
+    """Inverse of their covariance, shape (14, 14)."""
+    pixels: int
+    """Pixels of the surface."""
+    height_m: float
+    """Mean distance of these from it, m."""
+
+
+def _fitted(
+    mean: FloatArray, before: FloatArray, prior: FloatArray, seen: SurfaceView, settings: HandEyeSettings
+) -> _Fit:
+    """One Gauss-Newton step from ``mean``, where ``before`` was known with the information ``prior``."""
     camera, period = seen.flow.intrinsics, seen.flow.period
     x, y = camera.grid
     view, jacobian = _true_view(mean, seen)
     warp = np.concatenate([[seen.flow.warp_inverse_depth], seen.warp_twist])
     scale = np.array([camera.fx * period, camera.fy * period])
-    bounds = np.array(
-        [settings.stride, settings.highest_m, settings.least_sure_m, settings.thickness_m]
-        + [settings.shared / settings.stride**2]
-    )
+    shared = settings.shared / settings.stride**2
+    bounds = np.array([settings.stride, settings.highest_m, settings.least_sure_m, settings.thickness_m, shared])
     sums = np.zeros((UNKNOWNS + 2, UNKNOWNS))
-    information, gradient = seen.flow.information, seen.flow.gradient
-    gain = 1.0 + float(mean[GAIN])
-    plane_equations(information, gradient, seen.usable, x[0], y[:, 0], view, jacobian, warp, scale, gain, bounds, sums)
-    lower = sums[:UNKNOWNS]
-    matrix = lower + np.tril(lower, -1).T
-    pixels = int(sums[UNKNOWNS + 1, 0])
-    return matrix, sums[UNKNOWNS], pixels, float(sums[UNKNOWNS + 1, 1]) / max(pixels, 1)
+    products, gain = (seen.flow.information, seen.flow.gradient), 1.0 + float(mean[GAIN])
+    plane_equations(*products, seen.usable, x[0], y[:, 0], view, jacobian, warp, scale, gain, bounds, sums)
+    information = prior + sums[:UNKNOWNS] + np.tril(sums[:UNKNOWNS], -1).T
+    step = np.linalg.solve(information, sums[UNKNOWNS] - prior @ (mean - before))
+    pixels, heights = sums[UNKNOWNS + 1, :2].tolist()
+    return _Fit(mean + step, information, int(pixels), heights / max(pixels, 1.0))
 
 
 def _true_view(mean: FloatArray, seen: SurfaceView) -> tuple[FloatArray, FloatArray]:
@@ -246,4 +252,4 @@ def _true_view(mean: FloatArray, seen: SurfaceView) -> tuple[FloatArray, FloatAr
 
 def _rotation(vector: FloatArray) -> FloatArray:
     """Rotation matrix of a rotation vector, shape (3, 3)."""
-    return cv2.Rodrigues(np.asarray(vector, dtype=np.float64))[0]
+    return exp_twist(np.array([0.0, 0.0, 0.0, *vector]), 1.0)[:3, :3]
