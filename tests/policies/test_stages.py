@@ -18,6 +18,7 @@ STAGES = {
     "own motion": "target_inverse_depth",
     "zero-flow map": "zero_flow_test",
     "body": "with_outline",
+    "hand-eye": "learn",
     "memory": "remember",
     "looking": "with_seen",
     "obstacle term": "obstacle_term",
