@@ -32,6 +32,7 @@ from fixation_gym.perception.flow.optic_flow import (
 )
 from fixation_gym.perception.flow.rolling_shutter import row_maps
 from fixation_gym.perception.hand_eye.hand_eye import HandEye
+from fixation_gym.perception.hand_eye.hand_eye_filter import HandEyeState
 from fixation_gym.perception.pairing import PoseHistory, at_the_picture, carried
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.rectification import Rectification, in_colour
@@ -123,6 +124,11 @@ class Perception:
         """Camera of the grid of flow and zero-flow test: half the image, or less if that is wider than 160 px."""
         return flow_grid(self._working)
 
+    @property
+    def hand_eye(self) -> HandEyeState | None:
+        """What was learnt of the hand-eye error; None if it is not learnt."""
+        return self._hand_eye.state
+
     def update(self, observation: Observation) -> Percept:
         """Take in one observation.
 
@@ -172,7 +178,7 @@ class Perception:
         middle = self._frames[max(0, len(self._frames) - 2)]
         body = self._fit_body(frame, fixation)
         self._learn_hand_eye(flow, fixation)
-        learnt = self._hand_eye.state
+        learnt = self.hand_eye
         return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam, body, learnt)
 
     def _learn_hand_eye(self, flow: Flow, fixation: Fixation) -> None:

@@ -13,6 +13,8 @@ import numpy as np
 
 from fixation_gym.perception.distance.calibrating_estimator import Calibration
 from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings
+from fixation_gym.perception.hand_eye.hand_eye_filter import HandEyeState
+from fixation_gym.perception.hand_eye.plane_kernel import HEIGHT
 from fixation_gym.replay.time_offset import TimeOffset
 
 _SURE = 3.0
@@ -41,6 +43,30 @@ def calibration_summary(found: Calibration, settings: CalibratingSettings) -> di
         "pose_noise_deg": None if noise is None else math.degrees(noise * settings.rotation_std_rad),
         "restarts": found.restarts,
     }
+
+
+def hand_eye_summary(found: HandEyeState) -> dict[str, Any]:
+    """What the table's motion told of how the camera sits on the hand, JSON-able; errors each with its std."""
+    return {
+        "hand_eye_mm": (1e3 * found.mean[:3]).tolist(),
+        "hand_eye_std_mm": (1e3 * found.stds[:3]).tolist(),
+        "hand_eye_deg": np.degrees(found.mean[3:6]).tolist(),
+        "hand_eye_std_deg": np.degrees(found.stds[3:6]).tolist(),
+        "table_higher_mm": 1e3 * float(found.mean[HEIGHT]),
+        "pictures": found.pictures,
+        "corrected": found.proven,
+    }
+
+
+def hand_eye_alarms(found: HandEyeState | None) -> list[str]:
+    """A sentence on a camera that sits elsewhere, by how the table moves; none without such an error."""
+    if found is None or not found.proven:
+        return []
+    way, turn = (float(np.linalg.norm(error)) for error in (found.mean[:3], found.mean[3:6]))
+    return [
+        f"the table moves as if the camera sat {1e3 * way:.1f} mm and {math.degrees(turn):.1f} deg from where the "
+        "poses have it; poses were corrected by that: calibrate again"
+    ]
 
 
 def alarms_on(

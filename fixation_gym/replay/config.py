@@ -39,6 +39,9 @@ class ReplayConfig(ReaderOptions):
     pose_noise: tuple[float, float] = (3.0, 0.5)
     """Errors of the poses, mm and deg: what calibration of a camera in a hand usually leaves. They stay the same for a
     whole recording, and half as much differs from picture to picture."""
+    table_height: float | None = None
+    """Height of the table in the frame of the poses, whose z points up, m. Its surface is no obstacle then, and the way
+    it moves in the pictures tells the hand-eye error."""
     rerun: Path | None = None
     """Also write pictures, flow, map, target and camera path to this .rrd file, for the viewer Rerun."""
 
@@ -55,6 +58,8 @@ class ReplayConfig(ReaderOptions):
             detector_named(self.detector)
         if not all(math.isfinite(value) and value > 0.0 for value in self.pose_noise):
             raise UsageError(f"--pose-noise must be two numbers above 0, mm and deg, got {self.pose_noise}")
+        if self.table_height is not None and not math.isfinite(self.table_height):
+            raise UsageError(f"--table-height must be a number in m, got {self.table_height}")
         if self.rerun is not None and importlib.util.find_spec("rerun") is None:
             raise UsageError("--rerun needs rerun-sdk: pip install 'fixation-gym[viz]'")
 
@@ -70,6 +75,8 @@ class ReplayConfig(ReaderOptions):
         given = {name: value for name, value in paths.items() if value is not None}
         own = {"target": self.target, "detector": self.detector, "estimator": self.estimator}
         own |= {"pose_noise": list(self.pose_noise)}
+        if self.table_height is not None:
+            own |= {"table_height": self.table_height}
         if self.data is not None:
             own |= {"data": str(self.data)}
         return {"recording": str(self.recording), **own, **given}

@@ -8,6 +8,7 @@ from fixation_gym.perception.distance.calibrating_estimator import CalibratingEs
 from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings
 from fixation_gym.perception.distance.estimator import DistanceEstimator, PoseEstimator
 from fixation_gym.perception.distance.pose_filter import DistanceSettings
+from fixation_gym.perception.hand_eye.hand_eye_filter import HandEyeSettings
 from fixation_gym.replay.config import ReplayConfig
 
 _MOMENTARY = 0.5
@@ -41,6 +42,12 @@ def learning_settings(config: ReplayConfig) -> CalibratingSettings:
         image_age_s=_IMAGE_AGE_S,
         focal=_FOCAL,
     )
+
+
+def hand_eye_settings(config: ReplayConfig) -> HandEyeSettings:
+    """What a table of known height may tell of the hand-eye error of a recording."""
+    position, rotation = _pose_noise(config)
+    return HandEyeSettings(translation_std_m=position, rotation_std_rad=rotation)
 
 
 def _pose_noise(config: ReplayConfig) -> tuple[float, float]:

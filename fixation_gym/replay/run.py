@@ -28,11 +28,11 @@ from fixation_gym.recordings.public import located
 from fixation_gym.recordings.recording import RecordedFrame
 from fixation_gym.recordings.stamps import OrderedFrames, in_order
 from fixation_gym.replay import checkpoint
-from fixation_gym.replay.alarms import alarms_on, calibration_summary
+from fixation_gym.replay.alarms import alarms_on, calibration_summary, hand_eye_alarms, hand_eye_summary
 from fixation_gym.replay.checkpoint import CHECKPOINT_FILE, State
 from fixation_gym.replay.config import ReplayConfig
 from fixation_gym.replay.done import Done
-from fixation_gym.replay.estimators import chosen_estimator, learning_settings
+from fixation_gym.replay.estimators import chosen_estimator, hand_eye_settings, learning_settings
 from fixation_gym.replay.figure import draw_distance
 from fixation_gym.replay.looks import Look, Straightener, looks
 from fixation_gym.replay.notes import notes_on
@@ -105,8 +105,9 @@ def replay(config: ReplayConfig, out: Path) -> dict[str, Any]:
 def _begun(config: ReplayConfig, camera: Intrinsics, target: Target, straightener: Straightener) -> State:
     """What is known before the first picture."""
     estimator = chosen_estimator(config)
-    unseen, settings = straightener.unseen(), PerceptionSettings()
-    perception = Perception(camera.pinhole, settings, unseen, detector=target.detector, estimator=estimator)
+    settings, height = PerceptionSettings(hand_eye=hand_eye_settings(config)), config.table_height
+    unseen, detector = straightener.unseen(), target.detector
+    perception = Perception(camera.pinhole, settings, unseen, height, detector, estimator)
     return State(perception, estimator, Done(camera.pinhole, learning_settings(config)))
 
 
@@ -117,6 +118,7 @@ def _outcome(
     done, estimator, learning = state.done, state.estimator, learning_settings(config)
     gaps = ordered.gaps(PerceptionSettings().max_gap_s)
     found = estimator.calibration if isinstance(estimator, CalibratingEstimator) else None
+    by_table = None if config.table_height is None else state.perception.hand_eye
     return {
         "perceived": len(done.rows),
         "duplicate_times": ordered.duplicates,
@@ -131,7 +133,8 @@ def _outcome(
         "pose_delay_std_ms": None if offset is None else 1e3 * offset.std_s,
         **done.scores(),
         "calibration": None if found is None else calibration_summary(found, learning),
-        "alarms": alarms_on(found, learning, left_px, offset),
+        "hand_eye_by_table": None if by_table is None else hand_eye_summary(by_table),
+        "alarms": [*alarms_on(found, learning, left_px, offset), *hand_eye_alarms(by_table)],
         "perception_ms": 1000.0 * median(done.seconds) if done.seconds else None,
     }
 
