@@ -184,7 +184,9 @@ class Perception:
     def _learn_hand_eye(self, flow: Flow, fixation: Fixation) -> None:
         """Learn from how the support surface moves; what was learnt corrects the frames that are kept."""
         height = self.support_height_m
-        if height is None or not flow.valid or not all(frame.segmentation.visible for frame in self._frames):
+        if self.hand_eye is None or height is None or not flow.valid:
+            return
+        if not all(frame.segmentation.visible for frame in self._frames):
             return
         usable = usable_pixels(flow, self._frames[1].segmentation.mask, self._self_mask, self._settings.zero_flow)
         frames = self._hand_eye.learn(self._frames, flow, usable, height, fixation.distance_m)
