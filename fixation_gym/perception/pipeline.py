@@ -44,7 +44,6 @@ from fixation_gym.perception.zero_flow.zero_flow import (
     ZeroFlow,
     ZeroFlowSettings,
     unknown_zero_flow,
-    usable_pixels,
     zero_flow_test,
 )
 from fixation_gym.strangers import whose_code
@@ -177,19 +176,18 @@ class Perception:
             self._track = followed(segmentation, fixation.distance_m, T_base_cam, observation.time)
         middle = self._frames[max(0, len(self._frames) - 2)]
         body = self._fit_body(frame, fixation)
-        self._learn_hand_eye(flow, fixation)
+        self._learn_hand_eye(flow, zero_flow, fixation)
         learnt = self.hand_eye
         return Percept(observation.time, segmentation, flow, zero_flow, fixation, middle.T_base_cam, body, learnt)
 
-    def _learn_hand_eye(self, flow: Flow, fixation: Fixation) -> None:
+    def _learn_hand_eye(self, flow: Flow, zero_flow: ZeroFlow, fixation: Fixation) -> None:
         """Learn from how the support surface moves; what was learnt corrects the frames that are kept."""
         height = self.support_height_m
         if self.hand_eye is None or height is None or not flow.valid:
             return
         if not all(frame.segmentation.visible for frame in self._frames):
             return
-        usable = usable_pixels(flow, self._frames[1].segmentation.mask, self._self_mask, self._settings.zero_flow)
-        frames = self._hand_eye.learn(self._frames, flow, usable, height, fixation.distance_m)
+        frames = self._hand_eye.learn(self._frames, flow, zero_flow.usable, height, fixation.distance_m)
         self._frames = deque(frames, maxlen=3)
 
     def _estimating(self) -> AbstractContextManager[str]:

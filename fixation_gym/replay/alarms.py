@@ -13,8 +13,7 @@ import numpy as np
 
 from fixation_gym.perception.distance.calibrating_estimator import Calibration
 from fixation_gym.perception.distance.calibrating_filter import CalibratingSettings
-from fixation_gym.perception.hand_eye.hand_eye_filter import HandEyeState
-from fixation_gym.perception.hand_eye.plane_kernel import HEIGHT
+from fixation_gym.perception.hand_eye.hand_eye_filter import HEIGHT, HandEyeState
 from fixation_gym.replay.time_offset import TimeOffset
 
 _SURE = 3.0

@@ -60,15 +60,19 @@ class HandEye:
         if self.state is None or self._settings is None:
             return list(frames)
         first, middle, last = frames
-        back = inverse(self.state.T_believed_true)
-        believed = [frame.T_base_cam @ back for frame in frames]
         duration = last.time - first.time
+        believed = [frame.T_base_cam for frame in frames]
+        warp_twist = twist = mean_twist(believed[0], believed[2], duration)
+        if self.state.proven:
+            back = inverse(self.state.T_believed_true)
+            believed = [T @ back for T in believed]
+            twist = mean_twist(believed[0], believed[2], duration)
         seen = SurfaceView(
             flow=flow,
             usable=usable,
             T_base_believed=believed[1],
-            twist=mean_twist(believed[0], believed[2], duration),
-            warp_twist=mean_twist(first.T_base_cam, last.T_base_cam, duration),
+            twist=twist,
+            warp_twist=warp_twist,
             height_m=height_m,
             since_s=last.time - middle.time,
             target=middle.segmentation.centroid,

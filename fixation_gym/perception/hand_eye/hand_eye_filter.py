@@ -22,9 +22,13 @@ import numpy as np
 from fixation_gym.geometry.rigid import cross
 from fixation_gym.geometry.twist import exp_twist, skew
 from fixation_gym.perception.flow.optic_flow import Flow
-from fixation_gym.perception.hand_eye.plane_kernel import GAIN, HEIGHT, UNKNOWNS, plane_equations
+from fixation_gym.perception.hand_eye.plane_kernel import COLUMNS, plane_equations
 from fixation_gym.types import FloatArray, MaskArray
 
+_UNKNOWNS = 14
+"""Hand-eye translation (3) and rotation (3), height, gain of the flow, errors of the velocity (3) and the rate (3)."""
+HEIGHT, _GAIN = 6, 7
+"""Where the height and the gain are among them."""
 _KEPT = 8
 """Unknowns that last: all but the errors of the twist."""
 _HAND_EYE = slice(0, 6)
@@ -147,7 +151,7 @@ def first_state(settings: HandEyeSettings) -> HandEyeState:
     """What is known without a picture."""
     stds = [settings.translation_std_m] * 3 + [settings.rotation_std_rad] * 3
     mean = np.zeros(_KEPT)
-    mean[GAIN] = settings.gain
+    mean[_GAIN] = settings.gain
     return HandEyeState(mean, np.diag(np.square([*stds, settings.height_std_m, settings.gain_std])))
 
 
@@ -160,10 +164,10 @@ def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -
     if seen.height_m >= float(seen.T_base_believed[2, 3]):
         return state
     cov = state.cov + seen.since_s * np.diag(_walk(settings))
-    prior = np.zeros((UNKNOWNS, UNKNOWNS))
+    prior = np.zeros((_UNKNOWNS, _UNKNOWNS))
     prior[:_KEPT, :_KEPT] = np.linalg.inv(cov)
     prior[_KEPT:, _KEPT:] = np.diag([settings.velocity_std**-2] * 3 + [settings.rate_std**-2] * 3)
-    before = np.concatenate([state.mean, np.zeros(UNKNOWNS - _KEPT)])
+    before = np.concatenate([state.mean, np.zeros(_UNKNOWNS - _KEPT)])
     fit = _fitted(before, before, prior, seen, settings)
     if state.pictures < _FIRST and fit.pixels >= settings.least_pixels:
         fit = _fitted(fit.mean, before, prior, seen, settings)
@@ -211,17 +215,18 @@ def _fitted(
     """One Gauss-Newton step from ``mean``, where ``before`` was known with the information ``prior``."""
     camera, period = seen.flow.intrinsics, seen.flow.period
     x, y = camera.grid
-    view, jacobian = _true_view(mean, seen)
+    view, by_unknowns = _true_view(mean, seen)
     warp = np.concatenate([[seen.flow.warp_inverse_depth], seen.warp_twist])
     scale = np.array([camera.fx * period, camera.fy * period])
     shared = settings.shared / settings.stride**2
     bounds = np.array([settings.stride, settings.highest_m, settings.least_sure_m, settings.thickness_m, shared])
-    sums = np.zeros((UNKNOWNS + 2, UNKNOWNS))
-    products, gain = (seen.flow.information, seen.flow.gradient), 1.0 + float(mean[GAIN])
-    plane_equations(*products, seen.usable, x[0], y[:, 0], view, jacobian, warp, scale, gain, bounds, sums)
-    information = prior + sums[:UNKNOWNS] + np.tril(sums[:UNKNOWNS], -1).T
-    step = np.linalg.solve(information, sums[UNKNOWNS] - prior @ (mean - before))
-    pixels, heights = sums[UNKNOWNS + 1, :2].tolist()
+    sums = np.zeros((COLUMNS + 2, COLUMNS))
+    products, gain = (seen.flow.information, seen.flow.gradient), 1.0 + float(mean[_GAIN])
+    plane_equations(*products, seen.usable, x[0], y[:, 0], view, warp, scale, gain, bounds, sums)
+    normal = sums[:COLUMNS] + np.tril(sums[:COLUMNS], -1).T
+    information = prior + by_unknowns.T @ normal @ by_unknowns
+    step = np.linalg.solve(information, by_unknowns.T @ sums[COLUMNS] - prior @ (mean - before))
+    pixels, heights = sums[COLUMNS + 1, :2].tolist()
     return _Fit(mean + step, information, int(pixels), heights / max(pixels, 1.0))
 
 
@@ -229,15 +234,16 @@ def _true_view(mean: FloatArray, seen: SurfaceView) -> tuple[FloatArray, FloatAr
     """The surface m, n . p / distance = 1 with m = n / distance, and the twist, both in the true camera.
 
     Returns:
-        m, v and w, shape (9,), and their derivatives by the unknowns, shape (9, 14): those by r to first order in r.
+        m, v and w and the distance, shape (10,), and the derivatives of m, v, w and the gain by the unknowns, shape
+        (10, 14): those by r to first order in r.
     """
     t, turn_back = mean[:3], _rotation(mean[3:6]).T
     v, w = seen.twist[:3] + mean[_KEPT : _KEPT + 3], seen.twist[3:] + mean[_KEPT + 3 :]
     up = seen.T_base_believed[2, :3]
-    distance = seen.height_m + mean[HEIGHT] - seen.T_base_believed[2, 3] - float(up @ t)
+    distance = seen.height_m + float(mean[HEIGHT]) - float(seen.T_base_believed[2, 3]) - float(up @ t)
     surface = turn_back @ up / distance
     velocity, rate = turn_back @ (v + cross(w, t)), turn_back @ w
-    jacobian = np.zeros((9, UNKNOWNS))
+    jacobian = np.zeros((COLUMNS, _UNKNOWNS))
     jacobian[:3, :3] = np.outer(surface, up) / distance
     jacobian[:3, 3:6] = skew(surface)
     jacobian[:3, HEIGHT] = -surface / distance
@@ -245,9 +251,10 @@ def _true_view(mean: FloatArray, seen: SurfaceView) -> tuple[FloatArray, FloatAr
     jacobian[3:6, 3:6] = skew(velocity)
     jacobian[3:6, _KEPT : _KEPT + 3] = turn_back
     jacobian[3:6, _KEPT + 3 :] = -turn_back @ skew(t)
-    jacobian[6:, 3:6] = skew(rate)
-    jacobian[6:, _KEPT + 3 :] = turn_back
-    return np.concatenate([surface, velocity, rate]), jacobian
+    jacobian[6:9, 3:6] = skew(rate)
+    jacobian[6:9, _KEPT + 3 :] = turn_back
+    jacobian[9, _GAIN] = 1.0
+    return np.array([*surface, *velocity, *rate, distance]), jacobian
 
 
 def _rotation(vector: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, transform
+from fixation_gym.perception.zero_flow.memory_kernels import standing_depths
 from fixation_gym.perception.zero_flow.zero_flow import ZeroFlow
 from fixation_gym.types import FloatArray, MaskArray
 
@@ -23,6 +24,7 @@ _NEIGHBOURHOOD = np.ones((5, 5), np.uint8)
 _CORE = np.ones((3, 3), np.uint8)
 """What of a pixel's surroundings must stand there, too: the window smears every outline by up to two pixels; what is
 thin appears as wide as the window, so something is left of it."""
+_NO_SURFACE = np.zeros(4)
 _GRID_BITS = 20
 """Bits of a voxel's index along one axis: at 15 mm they reach 8 km, beyond any table."""
 _HALF_GRID = 1 << (_GRID_BITS - 1)
@@ -147,27 +149,28 @@ def _standing_points(
 ) -> FloatArray:
     """Points of the pixels that surely show something that stands in the work space, shape (n, 3), in base, m."""
     x, y = intrinsics.grid
-    depth_std = zero_flow.inverse_depth_std
-    known = zero_flow.supported & (depth_std < settings.max_relative_std * zero_flow.inverse_depth)
-    standing = known & (zero_flow.p_nearer > settings.min_probability)
+    surface = _NO_SURFACE
     if support_height_m is not None:
-        surface = _inverse_depth_of(support_height_m + settings.height_m, T_base_cam, x, y)
-        with np.errstate(invalid="ignore"):
-            above = zero_flow.inverse_depth - settings.height_sigmas * depth_std > surface
-            near = zero_flow.inverse_depth > zero_flow.fixated_inverse_depth / settings.farthest
-        standing |= known & above & near
+        rise = min(support_height_m + settings.height_m - float(T_base_cam[2, 3]), -1e-3)
+        surface = np.array([*T_base_cam[2, :3].tolist(), rise])
+    depths = np.empty(zero_flow.inverse_depth.shape, np.float32)
+    bounds = np.array(
+        [
+            settings.max_relative_std,
+            settings.min_probability,
+            settings.height_sigmas,
+            zero_flow.fixated_inverse_depth / settings.farthest,
+        ],
+        np.float32,
+    )
+    tested = zero_flow.inverse_depth, zero_flow.inverse_depth_std, zero_flow.p_nearer, zero_flow.supported
+    standing_depths(*tested, x[0], y[:, 0], surface, bounds, depths)
     # At an outline the flow's window mixes the thing with what is behind it; the thing is the nearest in sight there.
-    nearest = cv2.dilate(np.where(standing, zero_flow.inverse_depth, np.float32(0.0)), _NEIGHBOURHOOD)
-    rows, columns = np.nonzero(cv2.erode(standing.astype(np.uint8), _CORE))
+    nearest = cv2.dilate(depths, _NEIGHBOURHOOD)
+    rows, columns = np.nonzero(cv2.erode((depths > 0.0).view(np.uint8), _CORE))
     depth = 1.0 / nearest[rows, columns].astype(np.float64)
-    rays = np.stack([x[rows, columns], y[rows, columns], np.ones(len(rows))], axis=-1)
+    rays = np.stack([x[0, columns], y[rows, 0], np.ones(len(rows))], axis=-1)
     return transform(T_base_cam, rays * depth[:, None])
-
-
-def _inverse_depth_of(height: float, T_base_cam: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Inverse depth of a horizontal plane along the rays of pixels, shape (h, w), 1/m; not positive where they miss."""
-    rise = height - T_base_cam[2, 3]
-    return (T_base_cam[2, 0] * x + T_base_cam[2, 1] * y + T_base_cam[2, 2]) / min(rise, -1e-3)
 
 
 def seen_places(

@@ -70,6 +70,8 @@ class ZeroFlow:
     """Its standard deviation, shape (h, w), 1/m; inf where nothing is known."""
     fixated_inverse_depth: float
     """Inverse depth of the fixated object that the pixels were compared with, 1/m; 0 if nothing could be tested."""
+    usable: MaskArray
+    """Pixels that were asked: they show neither the target nor the robot, shape (h, w)."""
 
 
 def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
@@ -83,6 +85,7 @@ def unknown_zero_flow(height: int, width: int) -> ZeroFlow:
         inverse_depth=np.full((height, width), np.nan, np.float32),
         inverse_depth_std=np.full((height, width), np.inf, np.float32),
         fixated_inverse_depth=0.0,
+        usable=np.zeros((height, width), np.bool_),
     )
 
 
@@ -107,7 +110,7 @@ def zero_flow_test(
     shape = flow.overlap.shape
     if not flow.valid or not float(gaze.twist[:3] @ gaze.twist[:3]) > 1e-12:
         return unknown_zero_flow(*shape)
-    usable = usable_pixels(flow, gaze.target, self_mask, settings)
+    usable = _usable(flow, gaze.target, self_mask, settings)
     exact = _question(flow, gaze, settings, support_height_m)
     fixated, margin = gaze.inverse_distance, settings.depth_margin
     asked = FrontQuestion(flow, usable, exact, gaze.twist, fixated, margin, pictures)
@@ -128,10 +131,11 @@ def zero_flow_test(
         inverse_depth=answers.inverse_depth,
         inverse_depth_std=answers.inverse_depth_std,
         fixated_inverse_depth=gaze.inverse_distance,
+        usable=usable,
     )
 
 
-def usable_pixels(flow: Flow, target: MaskArray, self_mask: MaskArray | None, settings: ZeroFlowSettings) -> MaskArray:
+def _usable(flow: Flow, target: MaskArray, self_mask: MaskArray | None, settings: ZeroFlowSettings) -> MaskArray:
     """Pixels of the flow's grid, shape (h, w), that show neither the target nor the robot; masks are of any shape."""
     usable = flow.overlap & ~widened_on_grid(target, flow.overlap.shape, settings.target_margin_px)
     if self_mask is not None:
