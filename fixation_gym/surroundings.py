@@ -36,7 +36,8 @@ class Obstacles(NamedTuple):
 class Surroundings:
     """Adds up what every zero-flow test says of the work space.
 
-    State: the obstacle memory, the places that were looked at, and the time of the last test.
+    State: the obstacle memory, the places that were looked at, the time of the last test, and whether a hand-eye error
+    was proven by then.
     """
 
     def __init__(self, settings: MemorySettings | None = None) -> None:
@@ -46,8 +47,11 @@ class Surroundings:
 
     def reset(self) -> None:
         """Forget everything."""
+        self._time, self._corrected = -math.inf, False
+        self._forget()
+
+    def _forget(self) -> None:
         self._memory = ObstacleMemory.empty()
-        self._time = -math.inf
         self.seen: SeenSpace | None = None
         """Which places around the target were looked at; None before the first test."""
 
@@ -61,6 +65,10 @@ class Surroundings:
         if not percept.flow.valid or percept.flow.time <= self._time:
             return
         self._time = percept.flow.time
+        corrected = percept.hand_eye is not None and percept.hand_eye.proven
+        if corrected and not self._corrected:  # what was seen so far was seen by a camera that is somewhere else
+            self._forget()
+        self._corrected = corrected
         camera = (percept.flow.intrinsics, percept.T_base_flow)
         self._memory = remember(self._memory, percept.zfc, *camera, self._time, self._settings, support_height_m)
         target = percept.fixation.point_base

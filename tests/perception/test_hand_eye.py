@@ -1,5 +1,6 @@
 """The hand-eye error from the flow of a table that is exactly known."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,8 @@ from fixation_gym.perception.hand_eye.hand_eye_filter import (
 CAMERA = Intrinsics(80, 60, 75.0, 76.0, 40.0, 29.0)
 PERIOD, TABLE, RISE, GAIN = 0.04, 0.1, 0.003, -0.05
 SETTINGS = HandEyeSettings()
+BLIND = replace(SETTINGS, shared=1e9)
+"""One picture changes nothing that is known."""
 TRANSLATION, ROTATION = np.array([4e-3, -2e-3, 3e-3]), np.array([-0.012, 0.015, 0.01])
 TARGET = np.array([0.6, 0.0, TABLE + 0.03])
 
@@ -135,3 +138,15 @@ def test_what_tells_nothing_changes_nothing(change):
     state = learned_from(hand_eye(TRANSLATION, ROTATION), count=5)
     view = replace(surface_view(0.2, hand_eye(TRANSLATION, ROTATION)), **change)
     assert learned(state, view, SETTINGS) is state
+
+
+def test_many_pictures_prove_an_error_that_few_do_not():
+    """Between the two gates: the same evidence is enough only after many pictures."""
+    between = math.sqrt(0.5 * (SETTINGS.proven + SETTINGS.proven_by_many))
+    turn = np.array([0.0, between * math.hypot(SETTINGS.rotation_floor_rad, 1e-4), 0.0])
+    view = replace(surface_view(0.0, hand_eye(np.zeros(3), turn)), since_s=0.0)
+    mean = np.array([0.0, 0.0, 0.0, *turn, RISE, GAIN])
+    for before, proven in ((SETTINGS.least_pictures, False), (SETTINGS.many_pictures, True)):
+        state = learned(HandEyeState(mean, np.diag(np.full(8, 1e-8)), pictures=before), view, BLIND)
+        assert state.pictures == before + 1
+        assert state.proven == proven
