@@ -1,5 +1,6 @@
 """What is remembered around the target, and when it is forgotten."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +38,7 @@ def percept(time: float, hand_eye: HandEyeState | None) -> Percept:
     )
 
 
-def points_after(states: list[HandEyeState | None]) -> int:
+def points_after(states: Sequence[HandEyeState]) -> int:
     """Points that are believed after one picture with each of the states."""
     surroundings = Surroundings()
     for k, state in enumerate(states):
