@@ -147,6 +147,20 @@ def test_many_pictures_prove_an_error_that_few_do_not():
     view = replace(surface_view(0.0, hand_eye(np.zeros(3), turn)), since_s=0.0)
     mean = np.array([0.0, 0.0, 0.0, *turn, RISE, GAIN])
     for before, proven in ((SETTINGS.least_pictures, False), (SETTINGS.many_pictures, True)):
-        state = learned(HandEyeState(mean, np.diag(np.full(8, 1e-8)), pictures=before), view, BLIND)
+        known = HandEyeState(mean, np.diag(np.full(8, 1e-8)), pictures=before, in_a_row=SETTINGS.in_a_row)
+        state = learned(known, view, BLIND)
         assert state.pictures == before + 1
         assert state.proven == proven
+
+
+def test_evidence_must_last():
+    """Large evidence proves an error in 25 pictures, and a picture without takes them all back."""
+    large, none = np.array([0.0, 0.0, 0.0, 0.0, 0.02, 0.0, 0.0, -0.05]), np.array([0.0] * 7 + [-0.05])
+    cov = np.diag(np.full(8, 1e-8))
+    in_a_row = []
+    for mean in (large, none):
+        view = replace(surface_view(0.0, hand_eye(np.zeros(3), mean[3:6]), rise=0.0), since_s=0.0)
+        known = HandEyeState(mean, cov, pictures=100, in_a_row=SETTINGS.in_a_row - 2)
+        in_a_row.append(learned(known, view, BLIND))
+    assert [state.in_a_row for state in in_a_row] == [SETTINGS.in_a_row - 1, 0]
+    assert not any(state.proven for state in in_a_row)

@@ -96,6 +96,8 @@ class HandEyeSettings:
     approaches with nominal noise the evidence was 9.7 at most from 40 pictures on, and 7.2 from 80."""
     many_pictures: int = 80
     """So many."""
+    in_a_row: int = 25
+    """Pictures that must have enough evidence one after the other: a few with something odd in view may have 17."""
     off_axis: float = 0.12
     """A target farther from the image centre is not fixated, but grasped or lifted, and nothing is learnt; normalised
     image coordinates."""
@@ -114,6 +116,8 @@ class HandEyeState:
     """Whether the hand-eye error has shown."""
     pictures: int = 0
     """Pictures that it was learnt from."""
+    in_a_row: int = 0
+    """The last of these that had enough evidence, one after the other."""
 
     @property
     def stds(self) -> FloatArray:
@@ -180,15 +184,10 @@ def learned(state: HandEyeState, seen: SurfaceView, settings: HandEyeSettings) -
         return state
     cov = np.linalg.inv(fit.information)[:_KEPT, :_KEPT]
     found = HandEyeState(fit.mean[:_KEPT], 0.5 * (cov + cov.T), state.proven, state.pictures + 1)
-    return replace(found, proven=found.proven or _proven(found, settings))
-
-
-def _proven(state: HandEyeState, settings: HandEyeSettings) -> bool:
-    """Whether the evidence for an error is enough for so many pictures."""
-    if state.pictures < settings.least_pictures:
-        return False
-    enough = settings.proven if state.pictures < settings.many_pictures else settings.proven_by_many
-    return evidence(state, settings) > enough
+    enough = settings.proven if found.pictures < settings.many_pictures else settings.proven_by_many
+    in_a_row = state.in_a_row + 1 if evidence(found, settings) > enough else 0
+    shown = found.pictures >= settings.least_pictures and in_a_row >= settings.in_a_row
+    return replace(found, in_a_row=in_a_row, proven=found.proven or shown)
 
 
 def evidence(state: HandEyeState, settings: HandEyeSettings) -> float:
