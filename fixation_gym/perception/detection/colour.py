@@ -187,8 +187,11 @@ def _best_group(
         present = (small > 0).view(np.uint8)
     side = max(3, 2 * round(merge_gap_fraction * columns / 2) + 1)
     count, labels = cv2.connectedComponents(cv2.dilate(present, _square(side)))
-    if count <= 2 and (expected is None or expected.reach == math.inf):
-        return mask
+    if count <= 2:
+        if expected is None or expected.reach == math.inf:
+            return mask
+        near = _within_reach(small, intrinsics.scaled(rows, columns), window, step, expected)
+        return mask if near else np.zeros_like(mask)
     weight = small.ravel().astype(np.float64) / (255 if step > 1 else 1)
     score = np.bincount(labels.ravel(), weight, minlength=count)
     score[0] = 0.0
@@ -204,6 +207,19 @@ def _best_group(
     best = (labels == int(np.argmax(score))).astype(np.uint8)
     height, width = mask.shape
     return mask & cv2.resize(best, (width, height), interpolation=cv2.INTER_NEAREST)
+
+
+def _within_reach(
+    weight: ImageArray, camera: Intrinsics, window: tuple[slice, slice], step: int, expected: Expectation
+) -> bool:
+    """Whether the centroid of all that is there, weights of shape (h, w), lies within reach of the expected place."""
+    moments = cv2.moments(weight)
+    if moments["m00"] == 0.0:
+        return False
+    column = moments["m10"] / moments["m00"] + window[1].start // step
+    row = moments["m01"] / moments["m00"] + window[0].start // step
+    x, y = (column - camera.cx) / camera.fx, (row - camera.cy) / camera.fy
+    return math.hypot(x - expected.centroid[0], y - expected.centroid[1]) <= expected.reach
 
 
 @lru_cache(maxsize=8)
