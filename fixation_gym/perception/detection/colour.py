@@ -210,7 +210,7 @@ def _best_group(
 
 
 def _within_reach(
-    weight: ImageArray, camera: Intrinsics, window: tuple[slice, slice], step: int, expected: Expectation
+    weight: np.ndarray, camera: Intrinsics, window: tuple[slice, slice], step: int, expected: Expectation
 ) -> bool:
     """Whether the centroid of all that is there, weights of shape (h, w), lies within reach of the expected place."""
     moments = cv2.moments(weight)
