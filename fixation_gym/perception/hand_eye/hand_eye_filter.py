@@ -17,10 +17,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from fixation_gym.geometry.rigid import cross
-from fixation_gym.geometry.twist import exp_twist, skew
+from fixation_gym.geometry.twist import skew
 from fixation_gym.perception.flow.optic_flow import Flow
 from fixation_gym.perception.hand_eye.plane_kernel import COLUMNS, plane_equations
 from fixation_gym.types import FloatArray, MaskArray
@@ -32,7 +33,7 @@ HEIGHT, _GAIN = 6, 7
 _KEPT = 8
 """Unknowns that last: all but the errors of the twist."""
 _HAND_EYE = slice(0, 6)
-_FIRST = 20
+_FIRST = 10
 """The first pictures, whose equations are solved twice; later ones move little."""
 
 
@@ -270,4 +271,4 @@ def _true_view(mean: FloatArray, seen: SurfaceView) -> tuple[FloatArray, FloatAr
 
 def _rotation(vector: FloatArray) -> FloatArray:
     """Rotation matrix of a rotation vector, shape (3, 3)."""
-    return exp_twist(np.array([0.0, 0.0, 0.0, *vector]), 1.0)[:3, :3]
+    return np.asarray(cv2.Rodrigues(vector)[0], np.float64)

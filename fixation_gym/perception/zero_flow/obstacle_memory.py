@@ -186,9 +186,7 @@ def seen_places(
         slack: a thing hides a place if it is nearer by this share.
     """
     points = transform(inverse(T_base_cam), places)
-    with np.errstate(invalid="ignore"):
-        pixels = np.rint(intrinsics.project(points))
-        in_view = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
+    pixels, in_view = _pixels(points, intrinsics)
     seen = np.zeros(len(places), dtype=np.bool_)
     columns, rows = pixels[in_view].astype(np.int64).T
     with np.errstate(invalid="ignore"):
@@ -196,6 +194,14 @@ def seen_places(
         hidden_by = np.where(hidden, zero_flow.inverse_depth, np.float32(0.0))[rows, columns]
     seen[in_view] = hidden_by * points[in_view, 2] < 1.0 + slack
     return seen
+
+
+def _pixels(points: FloatArray, intrinsics: Intrinsics) -> tuple[FloatArray, MaskArray]:
+    """Nearest pixels of points, (n, 3) in ``cam`` in m, as whole numbers, shape (n, 2), and which are in view, (n,)."""
+    with np.errstate(invalid="ignore"):
+        pixels = np.rint(intrinsics.project(points))
+        u, v = pixels[:, 0], pixels[:, 1]
+        return pixels, (u >= 0) & (u < intrinsics.width) & (v >= 0) & (v < intrinsics.height)
 
 
 def _looked_at(
@@ -207,9 +213,7 @@ def _looked_at(
 ) -> tuple[MaskArray, MaskArray]:
     """Points near whose pixel something is known, and those where it is clearly behind them; each of shape (n,)."""
     points = transform(inverse(T_base_cam), memory.points)
-    with np.errstate(invalid="ignore"):
-        pixels = np.rint(intrinsics.project(points))
-        in_view = np.all((pixels >= 0) & (pixels < [intrinsics.width, intrinsics.height]), axis=-1)
+    pixels, in_view = _pixels(points, intrinsics)
     tested, contradicted = np.zeros((2, len(points)), dtype=np.bool_)
     columns, rows = pixels[in_view].astype(np.int64).T
     known = zero_flow.supported
