@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from fixation_gym.control.ways import SeenSpace
+from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.perception.percept import Percept
 from fixation_gym.perception.zero_flow.obstacle_memory import (
     MemorySettings,
@@ -16,6 +18,7 @@ from fixation_gym.perception.zero_flow.obstacle_memory import (
     remember,
     seen_places,
 )
+from fixation_gym.perception.zero_flow.zero_flow import unknown_zero_flow
 from fixation_gym.types import FloatArray
 
 _OWN_RADIUS = 0.05
@@ -43,6 +46,7 @@ class Surroundings:
     def __init__(self, settings: MemorySettings | None = None) -> None:
         """Start without knowledge; ``settings`` say how evidence is kept."""
         self._settings = settings or MemorySettings()
+        _run_once()
         self.reset()
 
     def reset(self) -> None:
@@ -81,3 +85,10 @@ class Surroundings:
         points, evidence = believed_points(self._memory, self._settings)
         others = np.linalg.norm(points - target, axis=1) > _OWN_RADIUS
         return Obstacles(points[others], evidence[others])
+
+
+@lru_cache(maxsize=1)
+def _run_once() -> None:
+    """Remember nothing once, so that no control step waits for compiled code to be made."""
+    camera, nothing = Intrinsics.from_fovy(8, 8, 0.7), unknown_zero_flow(8, 8)
+    remember(ObstacleMemory.empty(), nothing, camera, np.eye(4), 0.0, MemorySettings(), 0.0)
