@@ -7,7 +7,9 @@ since. All of it by stamps: nothing is estimated here.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,7 +55,7 @@ class PoseHistory:
         )
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
-        """Pose, shape (4, 4), and twist, shape (6,), at a time: between readings by constant motion, else the nearest.
+        """Pose, shape (4, 4), and twist, shape (6,), at a time: ``between`` two readings, else of the nearest.
 
         Raises:
             IndexError: without a reading.
@@ -62,11 +64,36 @@ class PoseHistory:
         if after == 0 or after == len(self.times):
             nearest = min(after, len(self.times) - 1)
             return self.poses[nearest], self.twists[nearest]
-        start, end = self.times[after - 1], self.times[after]
-        motion = mean_twist(self.poses[after - 1], self.poses[after], end - start)
-        share = (time - start) / (end - start)
-        twist = (1.0 - share) * self.twists[after - 1] + share * self.twists[after]
-        return self.poses[after - 1] @ exp_twist(motion, time - start), twist
+        duration = self.times[after] - self.times[after - 1]
+        share = (time - self.times[after - 1]) / duration
+        before = slice(after - 1, after + 1)
+        first, second = self.twists[before]
+        return between(self.poses[before], (first, second), duration, share), (1.0 - share) * first + share * second
+
+
+def between(poses: Sequence[FloatArray], twists: Sequence[FloatArray], duration: float, share: float) -> FloatArray:
+    """Pose between two readings, by the cubic that has their poses and twists (Hermite, in the frame of the first).
+
+    An arm speeds up and slows down between readings. Constant motion would miss that: at the servo's pace by 0.15 mm
+    and 0.4 mrad from one picture to the next, eight times as much as joint readings do.
+
+    Args:
+        poses: T_base_cam of both, each of shape (4, 4).
+        twists: measured camera twists of both, each of shape (6,); NaN: constant motion is all that is known.
+        duration: from one to the other, s.
+        share: of it that has passed, 0..1.
+
+    Returns:
+        T_base_cam, shape (4, 4).
+    """
+    mean = mean_twist(poses[0], poses[1], duration)
+    motion = share * mean
+    if not any(math.isnan(twist[0]) for twist in twists):
+        # What the speeds at both ends add to the motion at the mean one. A twist at the end is one in the frame of
+        # that end, which is that of the first to first order: a few hundredths of a radian.
+        left = 1.0 - share
+        motion = motion + share * left * (left * (twists[0] - mean) - share * (twists[1] - mean))
+    return poses[0] @ exp_twist(motion, duration)
 
 
 def at_the_picture(observation: Observation, history: PoseHistory) -> Observation:

@@ -7,9 +7,9 @@ import pytest
 from pinhole_scene import Scene, fixating_pose, noise_texture, observe, upright
 
 from fixation_gym.geometry.camera import Intrinsics
-from fixation_gym.geometry.rigid import inverse, matrix_to_pose, transform
+from fixation_gym.geometry.rigid import inverse, matrix_to_pose, rotation_vector, transform
 from fixation_gym.geometry.twist import exp_twist
-from fixation_gym.perception.pairing import PoseHistory
+from fixation_gym.perception.pairing import PoseHistory, between
 from fixation_gym.perception.pipeline import Perception
 
 CAMERA = Intrinsics.from_fovy(120, 160, 0.74)
@@ -114,3 +114,24 @@ def test_a_bad_reading_is_refused_and_leaves_no_trace():
     again, expected = perception.update(good), other.update(good)
     np.testing.assert_array_equal(again.fixation.point_base, expected.fixation.point_base)
     np.testing.assert_array_equal(again.zfc.cells, expected.zfc.cells)
+
+
+def test_a_pose_between_readings_keeps_up_with_an_arm_that_speeds_up():
+    """Truth by small steps of a twist that changes at a constant rate, as from one command of the servo to the next."""
+    rate, duration, steps = np.array([1.0, -0.6, 0.8, 0.5, 2.0, -0.8]), 0.04, 400
+
+    def path(share):
+        pose = pose_at(START)
+        for step in range(round(share * steps)):
+            pose = pose @ exp_twist(TWIST + rate * duration * (step + 0.5) / steps, duration / steps)
+        return pose
+
+    ends, twists = (path(0.0), path(1.0)), (TWIST, TWIST + rate * duration)
+    for share in (0.25, 0.5, 0.625, 0.75):
+        error = inverse(path(share)) @ between(ends, twists, duration, share)
+        assert np.linalg.norm(error[:3, 3]) < 2e-6
+        assert np.linalg.norm(rotation_vector(error[:3, :3])) < 1e-5
+    unmeasured = between(ends, (twists[0], np.full(6, np.nan)), duration, 0.5)
+    missed = inverse(path(0.5)) @ unmeasured
+    assert 1e-4 < np.linalg.norm(missed[:3, 3]) < 4e-4
+    np.testing.assert_allclose(between(ends, twists, duration, 1.0), ends[1], atol=1e-12)
