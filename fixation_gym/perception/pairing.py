@@ -17,11 +17,14 @@ import numpy as np
 from fixation_gym.geometry.rigid import inverse, matrix_to_pose, pose_to_matrix, transform
 from fixation_gym.geometry.twist import exp_twist, mean_twist
 from fixation_gym.perception.distance.pose_filter import Fixation
+from fixation_gym.perception.flow.rolling_shutter import RowMotion, row_motion
 from fixation_gym.perception.percept import Percept
 from fixation_gym.types import FloatArray, Observation
 
 _KEPT_S = 0.5
 """How long readings are kept, s: the pose of an older picture would be a guess."""
+_ROUNDING_S = 1e-3
+"""A last row that is read out now may seem later by this, by stamps of 32 bits, s."""
 _STALE_S = 0.3
 """A picture older than this says nothing about whether the target is seen now, s."""
 
@@ -69,6 +72,21 @@ class PoseHistory:
         before = slice(after - 1, after + 1)
         first, second = self.twists[before]
         return between(self.poses[before], (first, second), duration, share), (1.0 - share) * first + share * second
+
+    def row_motion(self, time: float, readout_s: float) -> RowMotion | None:
+        """Motion while a picture with a rolling shutter was read out, by the readings around its rows.
+
+        Args:
+            time: of the middle row, s.
+            readout_s: from the first row to the last, s.
+
+        Returns:
+            The motion; None if there is no shutter, or the rows were not all exposed between readings.
+        """
+        half = 0.5 * readout_s
+        if not readout_s or not self.times or time - half < self.times[0] or time + half > self.times[-1] + _ROUNDING_S:
+            return None
+        return row_motion([self.at(time + late)[0] for late in (-half, 0.0, half)], half)
 
 
 def between(poses: Sequence[FloatArray], twists: Sequence[FloatArray], duration: float, share: float) -> FloatArray:

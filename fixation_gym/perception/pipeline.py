@@ -30,7 +30,7 @@ from fixation_gym.perception.flow.optic_flow import (
     plane_homography,
     prepare_grey,
 )
-from fixation_gym.perception.flow.rolling_shutter import row_maps
+from fixation_gym.perception.flow.rolling_shutter import RowMotion, row_maps, row_motions
 from fixation_gym.perception.hand_eye.hand_eye import HandEye
 from fixation_gym.perception.hand_eye.hand_eye_filter import HandEyeState
 from fixation_gym.perception.pairing import PoseHistory, at_the_picture, carried
@@ -147,11 +147,12 @@ class Perception:
         if taken is None or taken == observation.time:
             return self._look(observation)
         if self._late is None or taken > self._late.time:
-            self._late = self._look(at_the_picture(observation, self._poses))
+            rows = self._poses.row_motion(taken, self._intrinsics.readout_s)
+            self._late = self._look(at_the_picture(observation, self._poses), rows)
         return carried(self._late, observation, self._poses)
 
-    def _look(self, observation: Observation) -> Percept:
-        """Take in an observation all of whose values are of one time."""
+    def _look(self, observation: Observation, rows: RowMotion | None = None) -> Percept:
+        """Take in an observation all of whose values are of one time, but for what its rows saw of the motion."""
         if self._frames and not observation.time > self._frames[-1].time:
             last = self._frames[-1].time
             raise ValueError(f"time must increase: got {observation.time} s after {last} s; call reset() first")
@@ -162,7 +163,7 @@ class Perception:
         segmentation = detected(self._detector, observation, expected, self._intrinsics)
         grey = prepare_grey(observation.rgb, self._working.height, self._working.width)
         twist = self._twist(observation, T_base_cam)
-        frame = Frame(observation.time, grey, T_base_cam, twist, segmentation, depth=observation.depth)
+        frame = Frame(observation.time, grey, T_base_cam, twist, segmentation, depth=observation.depth, rows=rows)
         with self._estimating():
             self._estimator.add_frame(frame)
         if self._frames and observation.time - self._frames[-1].time > self._settings.max_gap_s:
@@ -238,7 +239,10 @@ class Perception:
         times = [frame.time for frame in self._frames]
         rolling = None
         if self._working.readout_s > 0.0:
-            rolling = row_maps([frame.T_base_cam for frame in self._frames], times, fixated, self._working)
+            poses = [frame.T_base_cam for frame in self._frames]
+            by_poses = row_motions(poses, times)
+            motions = [frame.rows or motion for frame, motion in zip(self._frames, by_poses, strict=True)]
+            rolling = row_maps(poses, motions, fixated, self._working)
         return estimate_flow(
             [frame.grey for frame in self._frames],
             times,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, matrix_to_pose, transform
 from fixation_gym.perception.flow.optic_flow import plane_homography
-from fixation_gym.perception.flow.rolling_shutter import row_maps
+from fixation_gym.perception.flow.rolling_shutter import row_maps, row_motions
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.types import Observation
 
@@ -94,7 +94,7 @@ def test_rows_are_mapped_to_where_their_points_are_when_their_rows_are_exposed()
     """
     depth, times = 0.6, (0.5 - PERIOD, 0.5, 0.5 + PERIOD)
     poses = [pose_at(time) for time in times]
-    maps = row_maps(poses, times, 1.0 / depth, ROLLING)
+    maps = row_maps(poses, row_motions(poses, times), 1.0 / depth, ROLLING)
     for other, (columns, rows) in zip((0, 2), maps, strict=True):
         plain = plane_homography(inverse(poses[other]) @ poses[1], 1.0 / depth, CAMERA)
         errors, unknown = [], []
@@ -116,7 +116,7 @@ def test_without_time_between_rows_the_map_is_that_of_the_plane():
     times = (0.0, PERIOD, 2 * PERIOD)
     poses = [pose_at(time) for time in times]
     grid = np.stack([*np.meshgrid(np.arange(160.0), np.arange(120.0)), np.ones((120, 160))])
-    for other, (columns, rows) in zip((0, 2), row_maps(poses, times, 1.5, CAMERA), strict=True):
+    for other, (columns, rows) in zip((0, 2), row_maps(poses, row_motions(poses, times), 1.5, CAMERA), strict=True):
         x, y, n = np.tensordot(plane_homography(inverse(poses[other]) @ poses[1], 1.5, CAMERA), grid, 1)
         assert np.abs(columns - x / n).max() < 0.01
         assert np.abs(rows - y / n).max() < 0.01

@@ -18,6 +18,7 @@ from fixation_gym.perception.distance.flow_filters import FlowSamples
 from fixation_gym.perception.distance.flow_samples import FlowName
 from fixation_gym.perception.distance.pose_filter import DistanceSettings, DistanceState
 from fixation_gym.perception.distance.target_motion import InverseDepth
+from fixation_gym.perception.flow.rolling_shutter import RowMotion
 from fixation_gym.perception.scratch import Float32Array
 from fixation_gym.types import FloatArray
 
@@ -55,6 +56,8 @@ class Frame:
     """What a rig knows besides; None on a robot."""
     depth: FloatArray | None = None
     """What a depth camera says, any size of the same view, m; None without one."""
+    rows: RowMotion | None = None
+    """How the camera moved from row to row of a rolling shutter; None: as far as the poses of three frames tell."""
 
 
 def follow_poses(

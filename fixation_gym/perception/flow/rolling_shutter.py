@@ -1,12 +1,13 @@
 """A rolling shutter exposes every row at its own time: where a row of the middle frame is seen in another frame.
 
-To first order in the time between rows, with the twist that the camera has in each frame. Where that is changes slowly
-over a picture, so it is computed at nodes and interpolated between them.
+With the twist that the camera has in each frame, and how that changes from row to row. Where a point is seen changes
+slowly over a picture, so it is computed at nodes and interpolated between them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -25,41 +26,72 @@ _LEAST_DEPTH = 1e-3
 """What is behind another frame's camera is beyond its border, too: ``Flow.overlap`` leaves it out."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RowMotion:
+    """How the camera moved while a picture was read out: its mean twist from the middle row to one t later."""
+
+    twist: FloatArray
+    """In the middle row, [v, w] in ``cam``, shape (6,), m/s and rad/s."""
+    change: FloatArray
+    """What the mean twist has more for each second of t: half of the acceleration, shape (6,)."""
+
+
+def row_motion(poses: Sequence[FloatArray], half_s: float) -> RowMotion:
+    """Motion by the poses of the first, the middle and the last row, ``half_s`` apart, each of shape (4, 4)."""
+    first, middle, last = poses
+    twists = mean_twist(first, middle, half_s), mean_twist(middle, last, half_s)
+    return RowMotion(0.5 * (twists[0] + twists[1]), (twists[1] - twists[0]) / (2.0 * half_s))
+
+
+def row_motions(poses: Sequence[FloatArray], times: Sequence[float]) -> tuple[RowMotion, RowMotion, RowMotion]:
+    """Motion in each of three pictures by their poses alone: one acceleration for all; arguments as ``row_maps``."""
+    first, middle, last = poses
+    before, after = times[1] - times[0], times[2] - times[1]
+    twists = mean_twist(first, middle, before), mean_twist(middle, last, after)
+    change = (twists[1] - twists[0]) / (before + after)
+    at_each = twists[0] - change * before, twists[0] + change * before, twists[1] + change * after
+    first, middle, last = (RowMotion(twist, change) for twist in at_each)
+    return first, middle, last
+
+
 def row_maps(
-    poses: Sequence[FloatArray], times: Sequence[float], inverse_depth: float, intrinsics: Intrinsics
+    poses: Sequence[FloatArray],
+    motions: Sequence[RowMotion],
+    inverse_depth: float,
+    intrinsics: Intrinsics,
 ) -> tuple[PixelMap, PixelMap]:
     """Maps from pixels of the middle one of three frames to the first and to the last, for points of one depth.
 
     Args:
-        poses: camera poses in base at ``times``, when the middle rows were exposed, each of shape (4, 4).
-        times: increasing, s.
+        poses: camera poses in base when the middle rows were exposed, each of shape (4, 4).
+        motions: of the camera during each of the frames.
         inverse_depth: d of the points as the camera of their row in the middle frame sees them, 1/m.
         intrinsics: of the frames, with ``readout_s``.
     """
     first, middle, last = poses
-    before, after = times[1] - times[0], times[2] - times[1]
-    twists = mean_twist(first, middle, before), mean_twist(middle, last, after)
-    change = (twists[1] - twists[0]) / (before + after)  # half of the acceleration
     columns, rows = _nodes(intrinsics.width), _nodes(intrinsics.height)
     x, y = np.meshgrid((columns - intrinsics.cx) / intrinsics.fx, (rows - intrinsics.cy) / intrinsics.fy)
     seen = np.stack([x, y, np.ones_like(x)])
     own_s = _time_of_row(rows, intrinsics)[:, None]
-    seen = seen + own_s * _rate(seen, twists[0] + change * before, inverse_depth)
-    to_first = _in_other(seen, inverse(first) @ middle, twists[0] - change * before, inverse_depth, intrinsics)
-    to_last = _in_other(seen, inverse(last) @ middle, twists[1] + change * after, inverse_depth, intrinsics)
+    seen = seen + own_s * _rate(seen, motions[1].twist, inverse_depth)
+    seen = seen + own_s**2 * _rate(seen, motions[1].change, inverse_depth)
+    to_first = _in_other(seen, inverse(first) @ middle, motions[0], inverse_depth, intrinsics)
+    to_last = _in_other(seen, inverse(last) @ middle, motions[2], inverse_depth, intrinsics)
     return to_first, to_last
 
 
 def _in_other(
-    seen: FloatArray, T_other_middle: FloatArray, twist: FloatArray, inverse_depth: float, intrinsics: Intrinsics
+    seen: FloatArray, T_other_middle: FloatArray, motion: RowMotion, inverse_depth: float, intrinsics: Intrinsics
 ) -> PixelMap:
     """Pixels of another frame for points in the middle camera, shape (3, h, w), times their inverse depth."""
     points = np.tensordot(T_other_middle[:3, :3], seen, 1) + inverse_depth * T_other_middle[:3, 3, None, None]
     # The row, and with it the time, from where the point is in the middle row's camera; then once more.
-    rate, moved = _rate(points, twist, inverse_depth), points
+    rate, bend = _rate(points, motion.twist, inverse_depth), _rate(points, motion.change, inverse_depth)
+    moved = points
     for _ in range(2):
         row = intrinsics.fy * moved[1] / np.maximum(moved[2], _LEAST_DEPTH) + intrinsics.cy
-        moved = points - _time_of_row(row, intrinsics) * rate
+        late_s = _time_of_row(row, intrinsics)
+        moved = points - late_s * (rate + late_s * bend)
     in_front = np.maximum(moved[2], _LEAST_DEPTH)
     columns = intrinsics.fx * moved[0] / in_front + intrinsics.cx
     rows = intrinsics.fy * moved[1] / in_front + intrinsics.cy
