@@ -10,8 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from fixation_gym.geometry.camera import Intrinsics
 from fixation_gym.geometry.rigid import inverse, matrix_to_pose, transform
+from fixation_gym.geometry.twist import mean_twist
 from fixation_gym.perception.flow.optic_flow import plane_homography
 from fixation_gym.perception.flow.rolling_shutter import row_maps, row_motions
+from fixation_gym.perception.pairing import PoseHistory
 from fixation_gym.perception.pipeline import Perception
 from fixation_gym.types import Observation
 
@@ -87,17 +89,17 @@ def test_a_known_shutter_does_nearly_what_a_shutter_of_all_rows_at_once_does():
     assert error_known < 1.2 * error_at_once
 
 
-def test_rows_are_mapped_to_where_their_points_are_when_their_rows_are_exposed():
-    """Points are followed by the exact path of the camera: the row that shows them tells when, and that tells the row.
+def row_errors(motions) -> tuple[list[float], list[float]]:
+    """How far from where points are when their rows are exposed, px: by maps of ``motions``, and without a shutter.
 
-    What is left is the change of the acceleration, which three poses do not tell.
+    Points are followed by the exact path of the camera: the row that shows them tells when, and that tells the row.
     """
     depth, times = 0.6, (0.5 - PERIOD, 0.5, 0.5 + PERIOD)
     poses = [pose_at(time) for time in times]
-    maps = row_maps(poses, row_motions(poses, times), 1.0 / depth, ROLLING)
+    maps = row_maps(poses, motions(poses, times), 1.0 / depth, ROLLING)
+    errors, unknown = [], []
     for other, (columns, rows) in zip((0, 2), maps, strict=True):
         plain = plane_homography(inverse(poses[other]) @ poses[1], 1.0 / depth, CAMERA)
-        errors, unknown = [], []
         for u, v in ((5, 3), (150, 8), (80, 60), (20, 110), (155, 115)):
             ray = np.array([(u - CAMERA.cx) / CAMERA.fx, (v - CAMERA.cy) / CAMERA.fy, 1.0])
             point = transform(pose_at(times[1] + row_s(v, READOUT)), depth * ray)
@@ -105,11 +107,32 @@ def test_rows_are_mapped_to_where_their_points_are_when_their_rows_are_exposed()
             for _ in range(10):
                 pose = pose_at(times[other] + row_s(row, READOUT))
                 column, row = CAMERA.project(transform(inverse(pose), point))
-            errors.append(np.hypot(columns[v, u] - column, rows[v, u] - row))
+            errors.append(float(np.hypot(columns[v, u] - column, rows[v, u] - row)))
             x, y, n = plain @ (u, v, 1.0)
-            unknown.append(np.hypot(x / n - column, y / n - row))
-        assert max(errors) < 0.25
-        assert np.median(errors) < 0.25 * np.median(unknown)
+            unknown.append(float(np.hypot(x / n - column, y / n - row)))
+    return errors, unknown
+
+
+def test_rows_are_mapped_to_where_their_points_are_when_their_rows_are_exposed():
+    """What is left by three poses is the change of the acceleration."""
+    errors, unknown = row_errors(row_motions)
+    assert max(errors) < 0.25
+    assert np.median(errors) < 0.25 * np.median(unknown)
+
+
+def test_readings_between_pictures_say_how_rows_moved():
+    """Readings every 10 ms with the twist of their moment: a fifth at most is left of what three poses leave."""
+    history = PoseHistory()
+    for time in np.arange(0.40, 0.60, 0.01):
+        twist = mean_twist(pose_at(time - 1e-5), pose_at(time + 1e-5), 2e-5)
+        reading = Observation.of_camera(float(time), np.zeros((1, 1, 3), np.uint8), matrix_to_pose(pose_at(time)))
+        history = history.with_reading(replace(reading, camera_twist=twist))
+    errors, _ = row_errors(lambda poses, times: [history.row_motion(time, READOUT) for time in times])
+    by_poses, _ = row_errors(row_motions)
+    assert max(errors) < 0.04
+    assert np.median(errors) < 0.2 * np.median(by_poses)
+    assert history.row_motion(0.41, READOUT) is history.row_motion(0.58, READOUT) is None  # rows before and after all
+    assert history.row_motion(0.5, 0.0) is None
 
 
 def test_without_time_between_rows_the_map_is_that_of_the_plane():
