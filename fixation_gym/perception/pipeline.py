@@ -107,6 +107,7 @@ class Perception:
         self._detector.reset()
         self._poses = PoseHistory()
         self._hand_eye.reset()
+        self._noise_share = 1.0
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -243,7 +244,7 @@ class Perception:
             by_poses = row_motions(poses, times)
             motions = [frame.rows or motion for frame, motion in zip(self._frames, by_poses, strict=True)]
             rolling = row_maps(poses, motions, fixated, self._working)
-        return estimate_flow(
+        flow = estimate_flow(
             [frame.grey for frame in self._frames],
             times,
             self._working,
@@ -252,7 +253,10 @@ class Perception:
             self._settings.flow,
             self._scratch,
             rolling,
+            self._noise_share,
         )
+        self._noise_share = flow.noise_share
+        return flow
 
     def _look_for_obstacles(self, flow: Flow) -> ZeroFlow:
         """Zero-flow test where the flow is, after the distance has heard of the flow."""

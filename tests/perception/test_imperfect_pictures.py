@@ -75,7 +75,7 @@ def test_compression_raises_the_covariance_instead_of_alarms(monkeypatch):
 
     percepts = list(looks(compressed))[4:]
     assert np.mean([percept.flow.imperfect for percept in percepts]) > 0.9
-    monkeypatch.setattr(optic_flow, "take_own_noise", lambda *_: False)
+    monkeypatch.setattr(optic_flow, "take_own_noise", lambda *_: (False, 1.0))
     unaware = list(looks(compressed))[4:]
     assert alarms(percepts) < 0.4 * alarms(unaware)
     stated, before = (np.median(p[-1].zfc.inverse_depth_std) for p in (percepts, unaware))

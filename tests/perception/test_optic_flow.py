@@ -15,24 +15,28 @@ TIMES = (0.0, 0.04, 0.08)
 TEXTURE = noise_texture(7, size=512)[..., 0]
 
 
-def seen_plane(T_cam_start, distance, camera=CAMERA, noise=2.0, seed=0):
+def seen_plane(T_cam_start, distance, camera=CAMERA, noise=2.0, seed=0, contrast=1.0):
     """Image of the plane Z = distance of the starting camera, after the camera moved; 3x supersampled."""
     fine = camera.scaled(3 * camera.height, 3 * camera.width)
     texture_camera = np.array([[700.0, 0, 256], [0, 700.0, 256], [0, 0, 1]]) @ np.diag([0.33, 0.33, 1])
     to_image = plane_homography(T_cam_start, 1 / distance, fine) @ fine.matrix @ np.linalg.inv(texture_camera)
     image = cv2.warpPerspective(TEXTURE, to_image, (fine.width, fine.height), borderMode=cv2.BORDER_WRAP)
     image = cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+    image = 100.0 + contrast * (image - 100.0)
     return (image + noise * np.random.default_rng(seed).standard_normal(image.shape)).astype(np.float32)
 
 
-def flow_of(twist, distance=0.5, noise=2.0, warp=None, seed=0):
+def flow_of(twist, distance=0.5, noise=2.0, warp=None, seed=0, contrast=1.0, noise_share=1.0):
     """Flow estimated from three noisy frames and the true flow in px/s, both shape (h, w, 2)."""
     motions = [exp_twist(np.asarray(twist, float), t - TIMES[1]) for t in TIMES]
-    frames = [seen_plane(inverse(motion), distance, noise=noise, seed=seed + i) for i, motion in enumerate(motions)]
+    frames = [
+        seen_plane(inverse(motion), distance, noise=noise, seed=seed + i, contrast=contrast)
+        for i, motion in enumerate(motions)
+    ]
     maps = None
     if warp is not None:
         maps = tuple(plane_homography(inverse(motions[i]), warp, CAMERA) for i in (0, 2))
-    flow = estimate_flow(frames, TIMES, CAMERA, maps, warp or 0.0)
+    flow = estimate_flow(frames, TIMES, CAMERA, maps, warp or 0.0, noise_share=noise_share)
     grid = flow.intrinsics
     truth = np.stack(image_flow(*grid.grid, 1 / distance, np.asarray(twist, float)), -1) * [grid.fx, grid.fy]
     return flow, truth
@@ -57,6 +61,23 @@ def test_the_gain_of_lateral_flow_is_one_within_a_few_percent(speed_px, directio
     inside = flow.overlap
     gain = (flow.flow[inside] * truth[inside]).sum() / (truth[inside] ** 2).sum()
     assert gain == pytest.approx(1.0, abs=0.035 if speed_px <= 1 else 0.09)
+
+
+def test_weak_texture_moves_as_much_as_it_does_once_the_noise_was_measured():
+    """With more noise taken out of the gradients than there is, the weakest would seem to move twice as much."""
+    first_gains = []
+    for noise, contrast in ((2.0, 0.3), (1.0, 0.1), (0.3, 0.05)):
+        share, gains = 1.0, []
+        for seed in (0, 10):
+            flow, truth = flow_of([0.06, 0.03, 0, 0, 0, 0], 0.5, noise, 1.4, seed, contrast, share)
+            inside, beyond = flow.overlap, truth * (1.0 - 1.4 * 0.5)
+            moved = np.moveaxis(flow.residual, 0, -1)[inside] / 0.04
+            gains.append(float((moved * beyond[inside]).sum() / (beyond[inside] ** 2).sum()))
+            share = flow.noise_share
+        assert gains[1] == pytest.approx(1.0, abs=0.12)
+        assert 0.3 < share / (noise / 2.0) ** 2 < 1.0  # of windows with little noise, and interpolation smooths it
+        first_gains.append(gains[0])
+    assert first_gains[2] > 1.8
 
 
 def test_the_flow_of_a_general_motion_is_right_with_and_without_a_warp():

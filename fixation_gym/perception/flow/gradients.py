@@ -59,6 +59,7 @@ def gradient_sums(
     settings: FlowSettings,
     levels: int,
     scratch: Scratch,
+    noise_share: float = 1.0,
 ) -> Float32Array:
     """Windowed sums J_xx, J_xy, J_yy, b_x, b_y, e on the half-size grid, shape (6, h, w), in its px.
 
@@ -71,8 +72,9 @@ def gradient_sums(
         settings: noise and largest motion.
         levels: resolutions to use, this one included.
         scratch: work arrays.
+        noise_share: variance of the noise that these frames have, as a share of ``noise_std`` squared.
     """
-    sums = _level_sums(smooth, change, noise_std, settings, scratch)
+    sums = _level_sums(smooth, change, noise_std, settings, scratch, noise_share)
     height, width = smooth.shape
     half = (width // 2, height // 2)
     if levels == 1 or min(half) < 8 * kernels.WINDOW:
@@ -81,7 +83,7 @@ def gradient_sums(
     small = scratch.get("halved", 2, half[1], half[0])
     cv2.resize(smooth, half, dst=small[0], interpolation=cv2.INTER_AREA)
     cv2.resize(change, half, dst=small[1], interpolation=cv2.INTER_AREA)
-    coarse = gradient_sums(small[0], small[1], 0.5 * noise_std, settings, levels - 1, scratch)
+    coarse = gradient_sums(small[0], small[1], 0.5 * noise_std, settings, levels - 1, scratch, noise_share)
     _, motion = solve(coarse)
     # A motion of m px of these frames is m / 4 px of the coarser level's grid.
     fastest = (0.25 * settings.max_displacement) ** 2
@@ -90,12 +92,18 @@ def gradient_sums(
 
 
 def _level_sums(
-    smooth: Float32Array, change: Float32Array, noise_std: float, settings: FlowSettings, scratch: Scratch
+    smooth: Float32Array,
+    change: Float32Array,
+    noise_std: float,
+    settings: FlowSettings,
+    scratch: Scratch,
+    noise_share: float,
 ) -> Float32Array:
     """Windowed gradient products of one level, shape (6, h, w), weighted so that J is the information."""
     temporal = settings.noise_correlation * _TEMPORAL_NOISE_GAIN * noise_std**2
-    # Noise alone gives gradients; their mean energy is taken out, else plain surfaces would seem to stand still.
-    own = _SPATIAL_NOISE_GAIN * noise_std**2
+    # Noise alone gives gradients; their mean energy is taken out, else plain surfaces would seem to stand still. With
+    # more than there is, weak texture would seem to move too much: a table before the target rises above itself.
+    own = _SPATIAL_NOISE_GAIN * noise_share * noise_std**2
     shape = smooth.shape[0] // 2, smooth.shape[1] // 2
     pooled, windows = scratch.get("pooled", 10, *shape), scratch.get("windows", 10, *shape)
     sums = np.empty((6, *shape), np.float32)

@@ -68,6 +68,8 @@ class Flow:
     imperfect: bool = False
     """Whether these pictures have more noise than assumed, change in brightness or are dark: then information and
     covariances are those of the noise that was measured in them, and weak evidence is none."""
+    noise_share: float = 1.0
+    """Variance of the noise that was measured in these pictures, as a share of the assumed one, at most 1."""
 
     @cached_property
     def flow(self) -> Float32Array:
@@ -136,6 +138,7 @@ def estimate_flow(
     settings: FlowSettings | None = None,
     scratch: Scratch | None = None,
     row_maps: tuple[PixelMap, PixelMap] | None = None,
+    noise_share: float = 1.0,
 ) -> Flow:
     """Estimate the flow at the middle one of three frames.
 
@@ -150,6 +153,7 @@ def estimate_flow(
         scratch: work arrays to reuse from frame to frame, which is about twice as fast; None for new ones.
         row_maps: of a rolling shutter, in place of ``homographies``, which then say what all rows at once would have
             shown; see ``rolling_shutter``. The residual is of every row's own camera.
+        noise_share: ``Flow.noise_share`` of the pictures before.
     """
     settings, scratch = settings or _DEFAULTS, scratch or Scratch()
     smooth, change = scratch.get("filtered in time", 2, *frames[1].shape)
@@ -158,11 +162,11 @@ def estimate_flow(
     _filter_in_time((without_gain(seen[0], gains[0]), seen[1], without_gain(seen[2], gains[1])), smooth, change)
     dark = is_dark(seen[1])
     noise = settings.dark_noise_std if dark else settings.image_noise_std
-    sums = gradient_sums(smooth, change, noise, settings, settings.levels, scratch)
+    sums = gradient_sums(smooth, change, noise, settings, settings.levels, scratch, noise_share)
     cov, residual = solve(sums)
     warp = homographies or (np.eye(3), np.eye(3))
     overlap = _overlap(warp, intrinsics)
-    imperfect = take_own_noise(sums, cov, residual, overlap, settings, dark or gains != (1.0, 1.0))
+    imperfect, noise_share = take_own_noise(sums, cov, residual, overlap, settings, dark or gains != (1.0, 1.0))
     return Flow(
         time=times[1],
         valid=True,
@@ -173,6 +177,7 @@ def estimate_flow(
         information=sums[:3],
         gradient=sums[3:5],
         imperfect=imperfect,
+        noise_share=noise_share,
         warp_inverse_depth=warp_inverse_depth,
         overlap=overlap,
         warp=warp,

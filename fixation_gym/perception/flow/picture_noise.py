@@ -15,6 +15,10 @@ _LEAST_WINDOWS = 500
 _MUCH_NOISE = 1.6
 """Variance of the noise, relative to the assumed one, from which on it counts: small pictures of the usual noise, moved
 fast, have up to 1.5."""
+_PLAIN = 0.25
+"""Windows with the least unexplained, as a share of all: in them it is noise alone, and no error of the motion."""
+_SKIPPED = 3
+"""Every third window along each side is enough for that."""
 _NOISE_PX = 7
 """Side of the square over which the noise of windows is averaged, px of the grid."""
 
@@ -26,8 +30,8 @@ def take_own_noise(
     overlap: MaskArray,
     settings: FlowSettings,
     suspect: bool,
-) -> bool:
-    """Measure the noise of these pictures, as what the motion leaves unexplained; whether there is more than assumed.
+) -> tuple[bool, float]:
+    """Measure the noise of these pictures, as what the motion leaves unexplained.
 
     Pictures that are as good as assumed keep their covariance. In others every window has its own where that is
     larger: compression is not the same everywhere, and clipped pixels do not change as the others do.
@@ -39,6 +43,9 @@ def take_own_noise(
         overlap: windows inside all frames, shape (h, w).
         settings: what is assumed.
         suspect: whether they are dark or a gain was taken out.
+
+    Returns:
+        Whether there is more noise than assumed, and its variance as a share of the assumed one, at most 1.
     """
     ratio = noise_ratio(sums, motion, settings)
     windows = int(np.count_nonzero(overlap))
@@ -49,7 +56,14 @@ def take_own_noise(
         factor = np.maximum(cv2.blur(ratio, (_NOISE_PX, _NOISE_PX)), np.float32(1.0))
         cov *= factor
         sums /= factor
-    return imperfect
+    return imperfect, _noise_share(ratio) if windows >= _LEAST_WINDOWS else 1.0
+
+
+def _noise_share(ratio: Float32Array) -> float:
+    """Variance of the noise of plain windows, relative to what is assumed, at most 1; ``ratio`` as ``noise_ratio``."""
+    some = ratio[::_SKIPPED, ::_SKIPPED].ravel()
+    place = int(_PLAIN * some.size)
+    return min(float(np.partition(some, place)[place]), 1.0)
 
 
 def noise_ratio(sums: Float32Array, motion: Float32Array, settings: FlowSettings) -> Float32Array:
