@@ -4,7 +4,7 @@
 VENV := .venv/bin
 ARGS :=
 
-.PHONY: help demo test test-core test-newest clients lint docs wheel evaluate golden bench soak kills full_disk doctor core full lock clean
+.PHONY: help demo test test-core test-newest coverage clients lint docs wheel evaluate golden bench soak kills full_disk doctor core full lock clean
 
 demo: core  # film the robot in several scenarios
 	$(VENV)/fixation-gym demo $(ARGS)
@@ -17,6 +17,10 @@ test: full  # all tests, on up to four cores
 
 test-core: full  # tests that need no simulator
 	$(VENV)/pytest -m "not sim" $(ARGS)
+
+# Compiled functions are left out: their lines run as machine code. So are worker processes.
+coverage: full  # all tests, and which lines they reach
+	$(VENV)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile --cov --cov-report term:skip-covered $(ARGS)
 
 # The environments once more on the newest MuJoCo that was tried; it is put beside .venv and comes first on the path.
 NEWEST_MUJOCO := 4.0.0
